@@ -1,0 +1,1 @@
+//! The adaptive Haar basis on the octahedron (paper, section 4.2).

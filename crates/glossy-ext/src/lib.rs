@@ -1,0 +1,9 @@
+//! Glossy global illumination for hierarchical radiosity: illumination samples, directional distributions and
+//! reflectors, after Stamminger et al., "Efficient Glossy Global Illumination with Interactive Viewing", Computer
+//! Graphics Forum 19(1), 2000. It plugs into an engine through the hooks of `hr-diffuse` only.
+
+pub mod haar;
+pub mod reflector;
+
+pub use hr_diffuse::Rgb;
+pub use reflector::{Lobe, Reflector, Sample};

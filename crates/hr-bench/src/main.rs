@@ -1,0 +1,2 @@
+//! The `hr-bench` command.
+fn main() {}

@@ -1,0 +1,41 @@
+//! Errors of scene files: what is wrong, where, and what would be right.
+
+use std::path::PathBuf;
+
+/// Why a scene could not be loaded or a file not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The file could not be read or written.
+    #[error("{path}: {source}", path = path.display())]
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file's contents are wrong. `place` is file and line, or file and JSON path.
+    #[error("{place}: {what}; {mend}")]
+    Syntax {
+        /// File and line, or file and JSON path.
+        place: String,
+        /// What is wrong.
+        what: String,
+        /// What would be right.
+        mend: String,
+    },
+    /// There is nothing to light.
+    #[error("{name}: the scene has no surface; add at least one face or curved surface of non-zero area")]
+    Empty {
+        /// Scene or file name.
+        name: String,
+    },
+    /// Neither a file of a known kind nor a built-in scene.
+    #[error("'{name}' is neither a .mgf, .gltf, .glb or .obj file nor a built-in scene; built-in scenes: {known}")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The names of the built-in scenes.
+        known: String,
+    },
+}

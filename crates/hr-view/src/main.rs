@@ -1,0 +1,2 @@
+//! The `hr-view` command.
+fn main() {}
