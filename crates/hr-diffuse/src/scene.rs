@@ -1,7 +1,8 @@
 //! What a caller hands in: surfaces in the scene's own units, their diffuse materials, and lights without extent.
 
 use crate::Rgb;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+use std::sync::Arc;
 
 /// A geometric primitive in scene units. Curved ones stay curved: nothing is tessellated before it is needed.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,4 +124,13 @@ pub struct SceneInput {
     pub materials: Vec<DiffuseMaterial>,
     /// Lights without extent.
     pub lights: Vec<Light>,
+    /// Reflectance that varies over surfaces, where any does.
+    pub texture: Option<Arc<dyn SurfaceReflectance>>,
+}
+
+/// Diffuse reflectance that varies over a surface: textures, vertex colours.
+pub trait SurfaceReflectance: std::fmt::Debug + Send + Sync {
+    /// Mean diffuse reflectance over the polygon with these corners in the surface's (u, v), or `None` where the
+    /// material's own applies.
+    fn mean(&self, surface: u32, corners: &[Vec2]) -> Option<Rgb>;
 }
