@@ -11,8 +11,10 @@ pub mod scene;
 pub mod visibility;
 
 pub use cone::Cone;
+pub use geometry::{Aabb, Domain, Geometry, GeometryError, Normalization};
 pub use hooks::{Hierarchy, LightField, NodeId, Transfer};
 pub use scene::{DiffuseMaterial, Light, LightKind, SceneInput, Shape, Surface};
+pub use visibility::{Hit, Visibility};
 
 /// A linear RGB triple: reflectance, radiosity, irradiance (W/m²) or radiance (W/(m² sr)), as its context says.
 pub type Rgb = glam::Vec3;
