@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 
 /// Ratio of a sender's radius to its distance below which the point kernel replaces the closed form. The kernel's
 /// relative error is about the ratio's square: under 1%.
-const FAR: f32 = 0.1;
+const FAR: f32 = 0.06;
 /// The same for pieces of curved senders, which have no closed form and are split down to it.
 const CURVED_FAR: f32 = 0.35;
 /// Splits of a curved sender end here: 4⁴ pieces.

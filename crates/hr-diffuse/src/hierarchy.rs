@@ -113,8 +113,6 @@ pub(crate) fn mean_cosine(mean_normal: Vec3, direction: Vec3) -> f32 {
 /// The static part of a scene in unit space, shared by solver and display.
 #[derive(Debug)]
 pub struct SceneData {
-    /// Surfaces in unit space.
-    pub surfaces: Vec<Geometry>,
     /// Material of each surface.
     pub surface_materials: Vec<u32>,
     /// Shading normals of the surfaces that have any.
@@ -134,10 +132,16 @@ pub struct SceneData {
 }
 
 impl SceneData {
+    /// Surfaces in unit space.
+    #[must_use]
+    pub fn surfaces(&self) -> &[Geometry] {
+        self.visibility.geometries()
+    }
+
     /// Unit shading normal on the front side: interpolated where the surface has shading normals.
     #[must_use]
     pub fn shading_normal(&self, surface: u32, uv: Vec2) -> Vec3 {
-        let geometry = &self.surfaces[surface as usize];
+        let geometry = &self.surfaces()[surface as usize];
         match &self.shading_normals[surface as usize] {
             None => geometry.normal(uv),
             Some(n) => {
@@ -152,7 +156,7 @@ impl SceneData {
     #[must_use]
     pub fn reflectance(&self, surface: u32, domain: &Domain) -> Rgb {
         let textured = self.texture.as_ref().and_then(|texture| {
-            let corners = self.surfaces[surface as usize].corners(*domain);
+            let corners = self.surfaces()[surface as usize].corners(*domain);
             texture.mean(surface, &corners)
         });
         textured.unwrap_or(self.materials[self.surface_materials[surface as usize] as usize].reflectance)
@@ -180,7 +184,7 @@ impl Elements {
     /// reflects of a material beside the diffuse part (largest channel); `None` where it takes no part.
     pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<f32>) -> Self {
         let mut roots: Vec<Element> = Vec::new();
-        for (i, geometry) in scene.surfaces.iter().enumerate() {
+        for i in 0..scene.surfaces().len() {
             let material = &scene.materials[scene.surface_materials[i] as usize];
             let glossy = extra(scene.surface_materials[i]);
             let front = patch(scene, i as u32, Kind::Front, Domain::WHOLE, glossy);
@@ -197,7 +201,7 @@ impl Elements {
         trees.extend(Tree::build(backs));
         trees.extend(lights.into_iter().map(Tree::Leaf));
         let root = if trees.len() == 1 { trees.remove(0) } else { Tree::Inner(trees) };
-        let mut elements = Self { nodes: Vec::new(), surface_nodes: vec![[u32::MAX; 2]; scene.surfaces.len()] };
+        let mut elements = Self { nodes: Vec::new(), surface_nodes: vec![[u32::MAX; 2]; scene.surfaces().len()] };
         elements.flatten(root);
         elements
     }
@@ -266,7 +270,7 @@ impl Elements {
         if parent.child_count > 0 || !parent.is_patch() {
             return;
         }
-        let geometry = &scene.surfaces[parent.source as usize];
+        let geometry = &scene.surfaces()[parent.source as usize];
         let first = self.nodes.len() as u32;
         let parts = geometry.split(parent.domain);
         for part in &parts {
@@ -299,7 +303,7 @@ impl Elements {
             }
             let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
             let domains: SmallVec<[Domain; 4]> = self.nodes[children].iter().map(|child| child.domain).collect();
-            node = element.first_child + scene.surfaces[surface as usize].locate(&domains, uv) as u32;
+            node = element.first_child + scene.surfaces()[surface as usize].locate(&domains, uv) as u32;
         }
     }
 
@@ -332,7 +336,7 @@ const EMPTY: Element = Element {
 
 /// An element for a part of a surface.
 fn patch(scene: &SceneData, surface: u32, kind: Kind, domain: Domain, glossy: Option<f32>) -> Element {
-    let geometry = &scene.surfaces[surface as usize];
+    let geometry = &scene.surfaces()[surface as usize];
     let bounds = geometry.bounds(domain);
     let (low, high) = (bounds.min, bounds.max);
     let sign = if kind == Kind::Back { -1.0 } else { 1.0 };

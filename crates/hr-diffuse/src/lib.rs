@@ -27,11 +27,13 @@ pub mod visibility;
 
 pub use cone::Cone;
 pub use error::SolveError;
+pub use geometry::{Aabb, Domain, Geometry, GeometryError, Normalization};
 pub use hooks::{Hierarchy, LightField, NodeId, Transfer};
 pub use scene::{DiffuseMaterial, Light, LightKind, SceneInput, Shape, Surface, SurfaceReflectance};
 pub use solution::Solution;
 pub use solver::{Phase, Progress, Settings, Solver};
 pub use stats::Stats;
+pub use visibility::{Hit, Visibility};
 
 /// A linear RGB triple: reflectance, radiosity, irradiance (W/m²) or radiance (W/(m² sr)), as its context says.
 pub type Rgb = glam::Vec3;

@@ -127,7 +127,7 @@ fn key(position: Vec3, normal: Vec3, material: u32) -> Key {
 fn point_on(scene: &SceneData, elements: &Elements, leaf: u32, uv: Vec2) -> (Vec3, Vec3) {
     let element = &elements.nodes[leaf as usize];
     let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
-    let position = scene.surfaces[element.source as usize].point(uv);
+    let position = scene.surfaces()[element.source as usize].point(uv);
     (position, scene.shading_normal(element.source, uv) * side)
 }
 
@@ -139,7 +139,7 @@ fn lay_out(scene: &SceneData, elements: &Elements) -> Vertices {
     let mut shared: Vec<(u32, u32)> = Vec::new();
     for &leaf in &leaves {
         let element = &elements.nodes[leaf as usize];
-        for uv in scene.surfaces[element.source as usize].corners(element.domain) {
+        for uv in scene.surfaces()[element.source as usize].corners(element.domain) {
             let (position, normal) = point_on(scene, elements, leaf, uv);
             let next = vertices.positions.len() as u32;
             let vertex = *index.entry(key(position, normal, element.material)).or_insert(next);
@@ -155,7 +155,7 @@ fn lay_out(scene: &SceneData, elements: &Elements) -> Vertices {
     let mut filled = 0;
     for &leaf in &leaves {
         let element = &elements.nodes[leaf as usize];
-        let geometry = &scene.surfaces[element.source as usize];
+        let geometry = &scene.surfaces()[element.source as usize];
         while filled <= leaf {
             vertices.first[filled as usize] = vertices.fans.len() as u32;
             filled += 1;
@@ -261,7 +261,7 @@ fn gather_at<L: LightField>(
     renew: bool,
 ) -> (Rgb, u32) {
     let element = light.element(leaf);
-    let middle = light.scene.surfaces[element.source as usize].middle(element.domain);
+    let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET));
     let mut arriving: SmallVec<[(Rgb, f32, u32); 256]> = SmallVec::new();
     let mut total = 0.0;

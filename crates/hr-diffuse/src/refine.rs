@@ -11,7 +11,8 @@ use crate::oracle::{FactorBounds, factor_bounds};
 use crate::segments;
 use crate::stats::Skipped;
 use crate::transport::{Exitant, Light};
-use glam::Vec3;
+use crate::geometry::Domain;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
@@ -342,18 +343,35 @@ fn choose<L: LightField>(light: Light<'_, L>, pair: Pair, tolerance: Tolerance, 
 fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair) -> f32 {
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
     let direction = light.direction_to(r.center, pair.sender);
-    if !r.is_flat() {
-        return light.factor_at(r.center, direction, pair.sender);
-    }
     let distance = r.center.distance(s.center);
-    let normal = r.normals.axis;
-    if r.radius < 0.1 * (distance - s.radius) {
-        return light.factor_at(r.center, normal, pair.sender);
+    // A cluster near by is not a point: what its parts make of irradiance says what it counts for as a whole.
+    let whole = light.emitted(pair.sender, -direction).element_sum();
+    let resolve = s.kind == Kind::Cluster && s.radius > 0.25 * distance && whole > 0.0;
+    let factor_at = |x: Vec3, n: Vec3| {
+        if resolve {
+            (light.irradiance_at(x, n, pair.sender).element_sum() / whole).min(1.0)
+        } else {
+            light.factor_at(x, n, pair.sender)
+        }
+    };
+    if !r.is_flat() {
+        return factor_at(r.center, direction);
     }
-    let geometry = &light.scene.surfaces[r.source as usize];
-    let points = geometry.quadrature(r.domain);
-    let sum: f32 = points.iter().map(|&(uv, w)| w * light.factor_at(geometry.point(uv), normal, pair.sender)).sum();
-    sum
+    let normal = r.normals.axis;
+    if r.radius < 0.05 * (distance - s.radius) {
+        return factor_at(r.center, normal);
+    }
+    let geometry = &light.scene.surfaces()[r.source as usize];
+    let over = |part: Domain| -> f32 {
+        let at = |&(uv, w): &(Vec2, f32)| w * factor_at(geometry.point(uv), normal);
+        geometry.quadrature(part).iter().map(at).sum()
+    };
+    if distance - s.radius > 2.0 * r.radius {
+        return over(r.domain);
+    }
+    // Near its sender the factor bends more than four points can follow.
+    let parts = geometry.split(r.domain);
+    parts.iter().map(|&part| over(part) * geometry.area(part)).sum::<f32>() / r.area
 }
 
 /// Irradiance that a link would carry unoccluded (max channel).

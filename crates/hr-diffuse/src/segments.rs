@@ -20,7 +20,7 @@ fn draw(scene: &SceneData, elements: &Elements, mut node: u32, mut choice: f32, 
         match element.kind {
             Kind::Light => return None,
             Kind::Front | Kind::Back => {
-                let geometry = &scene.surfaces[element.source as usize];
+                let geometry = &scene.surfaces()[element.source as usize];
                 let (at, normal, _) = geometry.sample_area(element.domain, u.x, u.y);
                 let normal = if element.kind == Kind::Back { -normal } else { normal };
                 return Some(Point { at, normal, surface: element.source });
@@ -99,7 +99,7 @@ fn light_segment(scene: &SceneData, source: &Element, x: Vec3, n: Vec3) -> (Vec3
 
 /// Share of a sender that a point with normal `n` on a surface sees, from `count` segments; 0 where none faces it.
 #[must_use]
-pub fn visibility_at(
+pub(crate) fn visibility_at(
     scene: &SceneData,
     elements: &Elements,
     (x, n, surface): (Vec3, Vec3, u32),

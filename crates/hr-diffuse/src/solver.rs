@@ -370,10 +370,10 @@ impl<L: LightField> Solver<L> {
         for node in (0..count).rev() {
             let element = &elements.nodes[node];
             let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
-            if let Some(tallest) = height[range].iter().max() {
+            if let Some(tallest) = height[range].iter().copied().max() {
                 height[node] = tallest + 1;
                 if element.active {
-                    let layer = *tallest as usize;
+                    let layer = tallest as usize;
                     layers.resize_with(layers.len().max(layer + 1), Vec::new);
                     layers[layer].push(node as u32);
                 }
@@ -551,7 +551,6 @@ fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
         lights: lights.collect(),
         light_positions: input.lights.iter().map(|l| normalization.to_unit(l.position)).collect(),
         texture: input.texture.clone(),
-        surfaces,
         normalization,
     })
 }

@@ -150,7 +150,7 @@ impl<L: LightField> Light<'_, L> {
                 cosine.max(0.0) * element.area / (PI * d2 + element.area)
             }
             Kind::Front | Kind::Back => {
-                let geometry = &self.scene.surfaces[element.source as usize];
+                let geometry = &self.scene.surfaces()[element.source as usize];
                 form_factor::point_to_surface(geometry, &element.domain, element.kind == Kind::Back, x, n)
             }
         }
