@@ -82,6 +82,8 @@ pub struct Solver<L: LightField = ()> {
     own: Vec<Rgb>,
     /// Light through a node's own links, on nodes that are not flat.
     transfers: Vec<Vec<Transfer>>,
+    /// What each leaf's own place makes of the light that its ancestors' links carry, as a factor.
+    placed: Vec<f32>,
     /// Irradiance of each leaf when its light was last reflected by the extension.
     last_reflected: Vec<Rgb>,
     /// Area whose light counts.
@@ -122,6 +124,7 @@ impl<L: LightField> Solver<L> {
             unlit: vec![Pair { receiver: 0, sender: 0 }],
             own: Vec::new(),
             transfers: Vec::new(),
+            placed: Vec::new(),
             last_reflected: Vec::new(),
             area,
         };
@@ -140,10 +143,14 @@ impl<L: LightField> Solver<L> {
             let goal = if last || stopped { 0.1 * self.settings.error } else { self.settings.error };
             let most = if last || stopped { MOST_ITERATIONS } else { 3 };
             for iteration in 0..most {
+                // Once the light is there, and once more when it has spread.
+                if iteration == 1 || iteration == 6 {
+                    self.place();
+                }
                 let residual = self.iterate();
                 let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
                 stopped |= watch(&self.progress(Phase::Transport, fraction, *looseness)).is_break();
-                if residual < goal {
+                if self.remaining(residual) < goal {
                     break;
                 }
             }
@@ -313,9 +320,66 @@ impl<L: LightField> Solver<L> {
                 sum
             })
             .collect();
+        self.placed.resize(elements.nodes.len(), 1.0);
         for (leaf, sum) in leaves.into_iter().zip(sums) {
-            self.exitant.irradiance[leaf as usize] = sum;
+            self.exitant.irradiance[leaf as usize] = sum * self.placed[leaf as usize];
         }
+    }
+
+    /// Form factors are means over the element that a link ends at; a leaf in a corner of it sees more or less.
+    /// Compares the light that arrives at each leaf's middle with what was pushed down to it. In an enclosure
+    /// this makes every leaf's form factors sum to 1, whichever ancestors hold its links.
+    fn place(&mut self) {
+        let start = Instant::now();
+        let (elements, light) = (&self.elements, self.light());
+        let leaves: Vec<u32> = elements.patch_leaves().collect();
+        let factors: Vec<f32> = leaves
+            .par_iter()
+            .with_min_len(16)
+            .map(|&leaf| {
+                let element = light.element(leaf);
+                let normal = element.mean_normal.normalize_or_zero();
+                if !element.is_flat() || normal == Vec3::ZERO {
+                    return 1.0;
+                }
+                let (mut exact, mut pushed) = (0.0, 0.0);
+                let mut node = leaf;
+                loop {
+                    let receiver = light.element(node);
+                    for link in self.links.of(node) {
+                        let visible = link.visibility.abs();
+                        if visible > 0.0 {
+                            exact += visible * light.irradiance_at(element.center, normal, link.sender).element_sum();
+                            let direction = light.direction_to(receiver.center, link.sender);
+                            let carried = light.emitted(link.sender, -direction).element_sum() * link.factor * visible;
+                            pushed += if receiver.is_flat() {
+                                carried
+                            } else {
+                                let transfer = Transfer {
+                                    sender: NodeId(link.sender),
+                                    direction,
+                                    irradiance: Rgb::ZERO,
+                                    oriented: false,
+                                };
+                                let (direction, scale) = renewed(light, &transfer, element.center, node);
+                                carried * element.mean_cosine(direction) * scale
+                            };
+                        }
+                    }
+                    if node == 0 {
+                        break;
+                    }
+                    node = receiver.parent;
+                }
+                if pushed > 0.0 && exact > 0.0 { (exact / pushed).clamp(0.25, 4.0) } else { 1.0 }
+            })
+            .collect();
+        self.placed.clear();
+        self.placed.resize(elements.nodes.len(), 1.0);
+        for (leaf, factor) in leaves.into_iter().zip(factors) {
+            self.placed[leaf as usize] = factor;
+        }
+        self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 
     /// The extension turns the incident light of its leaves into exitant light.
@@ -462,6 +526,14 @@ impl<L: LightField> Solver<L> {
             power += f64::from(light.intensity.max_element() * spread);
         }
         if area > 0.0 { (lit / area) as f32 } else { (power / f64::from(self.area)) as f32 }
+    }
+
+    /// What all iterations to come would change, if the residuals go on shrinking as they did last: the sum of the
+    /// geometric series.
+    fn remaining(&self, residual: f32) -> f32 {
+        let before = self.stats.residuals.iter().rev().nth(1).copied().unwrap_or(f32::INFINITY);
+        let rate = (residual / before).clamp(0.0, 0.999);
+        if before.is_finite() { residual * (rate / (1.0 - rate)).max(0.1) } else { residual }
     }
 
     fn believed_error(&self, looseness: f32) -> f32 {
