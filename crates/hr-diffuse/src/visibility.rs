@@ -419,3 +419,6 @@ impl Groups {
         build_bvh2(&self.boxes, parameters, &mut Duration::default())
     }
 }
+
+#[cfg(test)]
+mod tests;

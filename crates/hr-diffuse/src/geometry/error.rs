@@ -9,8 +9,8 @@ pub enum GeometryError {
     /// A coordinate or radius is infinite or not a number. Mend the file, or leave the surface out.
     #[error("a coordinate or radius is not a finite number; correct it or leave the surface out")]
     NonFinite,
-    /// Corners coincide or lie on one line. Leave the surface out: it neither sends nor receives light.
-    #[error("the {0} has no area: its corners coincide or lie on one line; leave it out")]
+    /// It encloses no area. Leave the surface out: it neither sends nor receives light.
+    #[error("the {0} has no area (corners that coincide, lie on one line, or cross over); leave it out")]
     NoArea(&'static str),
     /// A radius is out of its range.
     #[error("{what} is {value}, but must be {range}")]

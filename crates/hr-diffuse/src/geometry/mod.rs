@@ -15,6 +15,8 @@ mod normalization;
 mod polygon;
 mod revolution;
 mod roots;
+#[cfg(test)]
+pub(crate) mod tests;
 
 pub use aabb::Aabb;
 pub use error::GeometryError;
@@ -224,11 +226,15 @@ impl Geometry {
                 return smallvec![part(u0, v0, u, v), part(u, v0, u1, v), part(u0, v, u, v1), part(u, v, u0, v0)];
             }
             Self::Quad(quad) => cuts(quad.extent(domain)),
-            Self::Revolution(revolution) => match revolution.turns(domain) {
-                (around, _) if around > 0.25 => (true, false),
-                (_, along) if along > 0.25 => (false, true),
-                _ => cuts(revolution.extent(domain)),
-            },
+            Self::Revolution(revolution) => {
+                // Pieces that go far around are bent, not long: one cut at a time, the axis first.
+                let (around, along) = revolution.turns(domain);
+                match cuts(revolution.extent(domain)) {
+                    (true, _) if around > 0.25 => (true, false),
+                    (_, true) if along > 0.25 => (false, true),
+                    cuts => cuts,
+                }
+            }
         };
         match (cut_u, cut_v) {
             (true, false) => smallvec![part(u0, v0, u, v1), part(u, v0, u1, v1)],

@@ -116,30 +116,27 @@ impl Quad {
         (p0 * (s * t) + p1 * (u * t)) + (p2 * (u * v) + p3 * (s * v))
     }
 
-    pub(super) fn jacobian(&self, uv: Vec2) -> f32 {
+    /// Tangents ∂P/∂u and ∂P/∂v.
+    fn tangents(&self, uv: Vec2) -> (Vec3, Vec3) {
         let [p0, p1, p2, p3] = self.points;
-        let along_u = (p1 - p0).lerp(p2 - p3, uv.y);
-        let along_v = (p3 - p0).lerp(p2 - p1, uv.x);
+        ((p1 - p0).lerp(p2 - p3, uv.y), (p3 - p0).lerp(p2 - p1, uv.x))
+    }
+
+    pub(super) fn jacobian(&self, uv: Vec2) -> f32 {
+        let (along_u, along_v) = self.tangents(uv);
         along_u.cross(along_v).length()
     }
 
     pub(super) fn domain_area(&self, domain: Domain) -> f32 {
-        // Lines of constant u or v are straight: the part is a quadrilateral, and half the cross product of its
-        // diagonals its area.
-        if domain == Domain::WHOLE {
-            return self.area;
-        }
-        let Domain { u0, v0, u1, v1 } = domain;
-        let at = |u, v| self.point(vec2(u, v));
-        0.5 * (at(u1, v1) - at(u0, v0)).cross(at(u0, v1) - at(u1, v0)).length()
+        // In the plane the Jacobian is linear in u and v (the product of the mixed terms vanishes): its mean is the
+        // middle's.
+        self.jacobian(domain.lerp(0.5, 0.5)) * domain.rectangle()
     }
 
-    /// Mean lengths of a part along u and v.
+    /// Lengths of a part along u and v, in its middle.
     pub(super) fn extent(&self, domain: Domain) -> (f32, f32) {
-        let Domain { u0, v0, u1, v1 } = domain;
-        let length = |a, b| self.point(a).distance(self.point(b));
-        let (a, b, c, d) = (vec2(u0, v0), vec2(u1, v0), vec2(u1, v1), vec2(u0, v1));
-        (0.5 * (length(a, b) + length(d, c)), 0.5 * (length(a, d) + length(b, c)))
+        let (along_u, along_v) = self.tangents(domain.lerp(0.5, 0.5));
+        (along_u.length() * (domain.u1 - domain.u0), along_v.length() * (domain.v1 - domain.v0))
     }
 
     /// Inverts the bilinear map in the plane: the line of constant v through the point fulfils a quadratic, of
