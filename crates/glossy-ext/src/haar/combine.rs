@@ -1,7 +1,8 @@
 //! Sums and averages of distributions: pull (paper, section 3), and accumulation.
 
 use super::mesh::{Mesh, Midpoint, NO_VERTEX};
-use super::triangle::child_corners;
+use super::project::Variation;
+use super::triangle::{child_corners, midpoints};
 use super::{Haar, Node, Refinement};
 use crate::Rgb;
 
@@ -18,7 +19,7 @@ impl Haar {
 
     /// The weighted sum Σ wᵢ hᵢ of distributions, such as those of the children of an element weighted by their
     /// share of its area. It is made on the union of the subdivisions, then coarsened wherever all of its values
-    /// over a triangle pass the refiner; `offset` as in [`Known`](super::Known). Many sharp distributions
+    /// over a triangle pass the refiner, keeping the energy; `offset` as in [`Known`](super::Known). Many sharp distributions
     /// often average to a smooth one. Distributions with a weight that is zero or not finite are left out.
     #[must_use]
     pub fn average(distributions: &[(f32, &Self)], settings: &Refinement, offset: Rgb) -> Self {
@@ -105,37 +106,51 @@ fn deposit(
 /// What is under a triangle of the mesh.
 #[derive(Clone, Copy)]
 struct Summary {
-    low: Rgb,
-    high: Rgb,
+    variation: Variation,
     mean: Rgb,
     center: Rgb,
 }
 
 fn summaries(mesh: &Mesh) -> Vec<Summary> {
     let zero = Summary {
-        low: Rgb::ZERO,
-        high: Rgb::ZERO,
+        variation: Variation::default(),
         mean: Rgb::ZERO,
         center: Rgb::ZERO,
     };
     let mut all = vec![zero; mesh.tris.len()];
     // Children come after their parents.
     for (index, tri) in mesh.tris.iter().enumerate().rev() {
+        let (corners, mids) = (mesh.corner_values(tri), mesh.mid_values(tri));
+        // How far the midpoints are from the chords of their edges.
+        let bend =
+            std::iter::zip(mids, midpoints(corners)).map(|(m, b)| (m - b).abs().max_element());
+        let bend = bend.fold(0.0, f32::max);
         all[index] = if tri.is_divided() {
             let first = tri.children as usize;
-            let [a, b, c, middle] = [0, 1, 2, 3].map(|i| all[first + i]);
+            let parts = [0, 1, 2, 3].map(|i| all[first + i]);
+            let variations = parts.map(|p| p.variation);
             Summary {
-                low: a.low.min(b.low).min(c.low).min(middle.low),
-                high: a.high.max(b.high).max(c.high).max(middle.high),
-                mean: (a.mean + b.mean + c.mean + middle.mean) * 0.25,
-                center: middle.center,
+                variation: Variation {
+                    low: variations.iter().fold(Rgb::MAX, |low, v| low.min(v.low)),
+                    high: variations.iter().fold(Rgb::MIN, |high, v| high.max(v.high)),
+                    // The interpolations of parent and child differ by no more than the midpoints do.
+                    deviation: bend + variations.iter().fold(0.0, |most, v| v.deviation.max(most)),
+                },
+                mean: parts.iter().map(|p| p.mean).sum::<Rgb>() * 0.25,
+                center: parts[3].center,
             }
         } else {
-            let (corners, mids) = (mesh.corner_values(tri), mesh.mid_values(tri));
             let values = || corners.iter().chain(&mids).copied();
+            let (low, high) = (
+                values().fold(Rgb::MAX, Rgb::min),
+                values().fold(Rgb::MIN, Rgb::max),
+            );
             Summary {
-                low: values().fold(Rgb::MAX, Rgb::min),
-                high: values().fold(Rgb::MIN, Rgb::max),
+                variation: Variation {
+                    low,
+                    high,
+                    deviation: bend,
+                },
                 mean: mesh.mean(tri),
                 center: mids.iter().sum::<Rgb>() / 3.0,
             }
@@ -163,7 +178,7 @@ fn coarsen(fine: &Mesh, settings: &Refinement, offset: Rgb) -> Mesh {
         let (there, what) = (fine.tris[same[index] as usize], all[same[index] as usize]);
         let wanted = tri.level < settings.max_level()
             && (tri.level < settings.min_level()
-                || settings.is_rough(what.low, what.high, what.center + offset, largest));
+                || settings.is_rough(&what.variation, what.center + offset, largest));
         if !tri.is_divided() && there.is_divided() && wanted {
             mesh.divide(index as u32, &mut |m: &Midpoint| {
                 let mids = fine.tris[same[m.tri as usize] as usize].mids;
@@ -177,9 +192,7 @@ fn coarsen(fine: &Mesh, settings: &Refinement, offset: Rgb) -> Mesh {
         }
         index += 1;
     }
-    if settings.preserve_energy {
-        let means: Vec<Option<Rgb>> = same.iter().map(|&t| Some(all[t as usize].mean)).collect();
-        mesh.preserve_means(&means, |_| false);
-    }
+    let means: Vec<Option<Rgb>> = same.iter().map(|&t| Some(all[t as usize].mean)).collect();
+    mesh.preserve_means(&means, |_| false);
     mesh
 }

@@ -193,21 +193,72 @@ fn integrals_of_lobes_converge() {
     }
 }
 
-/// Keeping the means pays: a coarse projection has less than half the error in energy of plain interpolation.
+/// Mean over directions of a lobe: basis functions, error in energy, L1 error, both relative to the lobe's energy.
+fn quality(settings: &Refinement, exponent: f32) -> [f32; 3] {
+    let truth = TAU / (exponent + 1.0);
+    let (axes, samples) = (9, 5000);
+    let mut mean = [0.0; 3];
+    for axis in directions(axes) {
+        let f = lobe(axis, exponent);
+        let peaks = [Peak {
+            direction: axis,
+            width: 1.0 / exponent.sqrt(),
+        }];
+        let haar = Haar::project(
+            settings,
+            &Known {
+                peaks: &peaks,
+                ..Known::NOTHING
+            },
+            &f,
+        )
+        .haar;
+        let l1: f32 = directions(samples)
+            .map(|d| (haar.eval(d).x - f(d).x).abs())
+            .sum();
+        mean[0] += haar.basis_functions() as f32 / axes as f32;
+        mean[1] += (haar.integral().x / truth - 1.0).abs() / axes as f32;
+        mean[2] += l1 / samples as f32 * 4.0 * PI / truth / axes as f32;
+    }
+    mean
+}
+
+#[test]
+fn defaults_are_as_good_as_documented() {
+    for exponent in [10.0, 60.0, 300.0] {
+        let [functions, energy, l1] = quality(&Refinement::default(), exponent);
+        assert!(
+            (500.0..1600.0).contains(&functions),
+            "cos^{exponent}: {functions} basis functions"
+        );
+        assert!(energy < 0.005, "cos^{exponent}: energy off by {energy}");
+        assert!(l1 < 0.03, "cos^{exponent}: mean error {l1}");
+    }
+}
+
 #[test]
 fn means_are_preserved() {
-    let error = |preserve_energy| {
-        let s = Refinement {
-            preserve_energy,
-            ..settings(2, 4, 0.5)
-        };
-        let sum: f32 = directions(31)
-            .map(|axis| (project(&s, lobe(axis, 60.0)).integral().x / (TAU / 61.0) - 1.0).abs())
-            .sum();
-        sum / 31.0
-    };
-    let (with, without) = (error(true), error(false));
-    assert!(with < 0.5 * without, "with {with}, without {without}");
+    let plain = quality(&exact(2, 5, 0.5), 10.0);
+    let kept = quality(&settings(2, 5, 0.5), 10.0);
+    assert_eq!(plain[0], kept[0], "the same subdivision");
+    assert!(kept[1] < 0.3 * plain[1], "energy: {plain:?}, {kept:?}");
+    assert!(kept[2] < 0.7 * plain[2], "mean error: {plain:?}, {kept:?}");
+}
+
+#[test]
+fn interpolation_refiner_saves_basis_functions() {
+    let paper = quality(&exact(1, 6, 0.5), 10.0);
+    let ours = quality(
+        &Refinement {
+            refiner: Refiner::Interpolation(0.05),
+            ..exact(1, 6, 0.5)
+        },
+        10.0,
+    );
+    assert!(
+        ours[0] < 0.6 * paper[0] && ours[2] < 1.1 * paper[2],
+        "{paper:?}, {ours:?}"
+    );
 }
 
 #[test]
@@ -635,61 +686,5 @@ proptest! {
         }
         let (e, f) = (coarse.integral().x, fine.integral().x);
         prop_assert!((e / f - 1.0).abs() < 0.02, "energy {e} for {f}");
-    }
-}
-
-#[test]
-#[ignore]
-fn experiment() {
-    for exponent in [10.0_f32, 60.0, 300.0, 2000.0] {
-        for (min, max, eps) in [
-            (1, 3, 0.5),
-            (1, 4, 0.5),
-            (2, 5, 0.5),
-            (1, 6, 0.5),
-            (1, 6, 0.2),
-            (1, 6, 0.1),
-        ] {
-            for preserve_energy in [false, true] {
-                let s = Refinement {
-                    preserve_energy,
-                    ..settings(min, max, eps)
-                };
-                let (mut e, mut bias, mut evals, mut basis, mut l1, mut l2, mut worst) =
-                    (0.0, 0.0, 0, 0, 0.0, 0.0, 0.0_f32);
-                let truth = TAU / (exponent + 1.0);
-                for axis in directions(31) {
-                    let peaks = [Peak {
-                        direction: axis,
-                        width: 1.0 / exponent.sqrt(),
-                    }];
-                    let made = Haar::project(
-                        &s,
-                        &Known {
-                            peaks: &peaks,
-                            ..Known::NOTHING
-                        },
-                        lobe(axis, exponent),
-                    );
-                    let r = made.haar.integral().x / truth - 1.0;
-                    e += r.abs() / 31.0;
-                    bias += r / 31.0;
-                    worst = worst.max(r.abs());
-                    evals += made.evaluations;
-                    basis += made.haar.basis_functions();
-                    for d in directions(20000) {
-                        let x = (made.haar.eval(d).x - lobe(axis, exponent)(d).x).abs();
-                        l1 += x / 20000.0 * 4.0 * PI / truth / 31.0;
-                        l2 += x * x / 20000.0 / 31.0 * 4.0 * PI / (PI / exponent);
-                    }
-                }
-                println!(
-                    "cos^{exponent} {min}/{max} eps {eps} keep {preserve_energy}: evals {} basis {} energy {e:.4} bias {bias:.4} worst {worst:.4} l1 {l1:.4} l2 {:.4}",
-                    evals / 31,
-                    basis / 31,
-                    l2.sqrt()
-                );
-            }
-        }
     }
 }
