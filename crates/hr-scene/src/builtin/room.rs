@@ -1,0 +1,6 @@
+//! (room)
+use super::build::Builder;
+use crate::Scene;
+pub(super) fn room() -> Scene {
+    Builder::new("room").done()
+}
