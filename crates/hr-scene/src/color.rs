@@ -26,19 +26,11 @@ impl Primaries {
     pub fn chromaticities(self) -> Chromaticities {
         match self {
             Self::Radiance => Chromaticities {
-                rgb: [
-                    DVec2::new(0.640, 0.330),
-                    DVec2::new(0.290, 0.600),
-                    DVec2::new(0.150, 0.060),
-                ],
+                rgb: [DVec2::new(0.640, 0.330), DVec2::new(0.290, 0.600), DVec2::new(0.150, 0.060)],
                 white: DVec2::splat(1.0 / 3.0),
             },
             Self::Rec709 => Chromaticities {
-                rgb: [
-                    DVec2::new(0.640, 0.330),
-                    DVec2::new(0.300, 0.600),
-                    DVec2::new(0.150, 0.060),
-                ],
+                rgb: [DVec2::new(0.640, 0.330), DVec2::new(0.300, 0.600), DVec2::new(0.150, 0.060)],
                 white: DVec2::new(0.3127, 0.3290),
             },
         }
@@ -67,8 +59,7 @@ impl Primaries {
             return DMat3::IDENTITY;
         }
         let cones = |p: Self| BRADFORD * xyz(p.chromaticities().white);
-        let adapt =
-            BRADFORD.inverse() * DMat3::from_diagonal(cones(Self::Rec709) / cones(self)) * BRADFORD;
+        let adapt = BRADFORD.inverse() * DMat3::from_diagonal(cones(Self::Rec709) / cones(self)) * BRADFORD;
         Self::Rec709.to_xyz().inverse() * adapt * self.to_xyz()
     }
 }
@@ -86,14 +77,8 @@ mod tests {
     fn grey_stays_grey() {
         for p in [Primaries::Radiance, Primaries::Rec709] {
             let white = p.to_srgb() * DVec3::ONE;
-            assert!(
-                white.abs_diff_eq(DVec3::ONE, 1e-12),
-                "{p:?}: white becomes {white}"
-            );
-            assert!(
-                (p.luminance_weights().element_sum() - 1.0).abs() < 1e-12,
-                "{p:?}: luminance of white is 1"
-            );
+            assert!(white.abs_diff_eq(DVec3::ONE, 1e-12), "{p:?}: white becomes {white}");
+            assert!((p.luminance_weights().element_sum() - 1.0).abs() < 1e-12, "{p:?}: luminance of white is 1");
         }
     }
 
@@ -101,19 +86,9 @@ mod tests {
     fn luminance_weights_are_the_published_ones() {
         // Radiance's own constants in color.h for these primaries and equal-energy white; Rec. 709's item 3.2.
         let radiance = DVec3::new(0.265_106, 0.670_106, 0.064_788);
-        assert!(
-            Primaries::Radiance
-                .luminance_weights()
-                .abs_diff_eq(radiance, 1e-5),
-            "Radiance"
-        );
+        assert!(Primaries::Radiance.luminance_weights().abs_diff_eq(radiance, 1e-5), "Radiance");
         let rec709 = DVec3::new(0.2126, 0.7152, 0.0722);
-        assert!(
-            Primaries::Rec709
-                .luminance_weights()
-                .abs_diff_eq(rec709, 1e-4),
-            "Rec. 709"
-        );
+        assert!(Primaries::Rec709.luminance_weights().abs_diff_eq(rec709, 1e-4), "Rec. 709");
     }
 
     #[test]

@@ -9,9 +9,5 @@ use std::path::Path;
 /// Always, for now.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
     let what = "OBJ files are not read yet".to_owned();
-    Err(SceneError::Syntax {
-        place: path.display().to_string(),
-        what,
-        mend: "use a built-in scene".to_owned(),
-    })
+    Err(SceneError::Syntax { place: path.display().to_string(), what, mend: "use a built-in scene".to_owned() })
 }

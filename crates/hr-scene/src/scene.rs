@@ -121,11 +121,7 @@ impl Scene {
     /// [`finish`](Self::finish) says.
     pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
         let path = Path::new(name_or_path);
-        let extension = path
-            .extension()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .to_lowercase();
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let scene = match extension.as_str() {
             "mgf" => mgf::load(path)?,
             "gltf" | "glb" => gltf_file::load(path)?,
@@ -162,24 +158,16 @@ mod tests {
     fn unknown_names_list_the_known_ones() {
         for name in ["", "rooom", "scene.blend", "no/such/folder", "room.png"] {
             let error = Scene::load(name).expect_err("unknown");
-            assert!(
-                matches!(error, SceneError::Unknown { .. }),
-                "{name}: {error}"
-            );
+            assert!(matches!(error, SceneError::Unknown { .. }), "{name}: {error}");
             let text = error.to_string();
-            assert!(
-                text.contains(&format!("'{name}'")) && text.contains("room, three-lights"),
-                "{text}"
-            );
+            assert!(text.contains(&format!("'{name}'")) && text.contains("room, three-lights"), "{text}");
         }
     }
 
     #[test]
     fn missing_files_are_named() {
         for name in ["no-such.mgf", "no-such.GLTF", "no-such.glb", "no-such.obj"] {
-            let error = Scene::load(name)
-                .expect_err("there is no such file")
-                .to_string();
+            let error = Scene::load(name).expect_err("there is no such file").to_string();
             assert!(error.contains(name), "{error}");
         }
     }
@@ -189,9 +177,7 @@ mod tests {
         let scene = Scene::load("furnace").expect("built in");
         let input = scene.input();
         assert_eq!(input.surfaces, scene.surfaces, "all surfaces");
-        let [wall] = input.materials[..] else {
-            panic!("one material: {:?}", input.materials)
-        };
+        let [wall] = input.materials[..] else { panic!("one material: {:?}", input.materials) };
         assert_eq!(wall.reflectance, Rgb::new(0.2, 0.5, 0.8), "reflectance");
         assert_eq!(wall.exitance, Rgb::new(1.0, 2.0, 3.0), "exitance");
         assert!(wall.two_sided, "sides");

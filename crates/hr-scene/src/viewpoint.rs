@@ -1,9 +1,9 @@
 //! Where to stand and where to walk in a scene: a camera for files without one, and the walkthrough's path.
 
 use crate::camera::unit;
-use crate::{Camera, Scene};
+use crate::{Camera, Rgb, Scene};
 use glam::DVec3;
-use hr_diffuse::Shape;
+use hr_diffuse::{Shape, Surface};
 use std::f64::consts::{PI, TAU};
 
 /// Eye height as a share of a room's height: 1.6 m of 2.6 m.
@@ -22,10 +22,7 @@ impl Scene {
     /// wide for other curved surfaces.
     #[must_use]
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        self.surfaces
-            .iter()
-            .map(|s| shape_bounds(&s.shape))
-            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+        self.surfaces.iter().map(|s| shape_bounds(&s.shape)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
     /// Which way is up: that of the first camera; else +y for glTF files, which say so; else (MGF, OBJ: their files do
@@ -44,12 +41,7 @@ impl Scene {
             let area = match &surface.shape {
                 Shape::Triangle([a, b, c]) => (*b - *a).cross(*c - *a) * 0.5,
                 Shape::Quad([a, b, c, d]) => (*c - *a).cross(*d - *b) * 0.5,
-                Shape::Ring {
-                    normal,
-                    inner,
-                    outer,
-                    ..
-                } => *normal * (PI * (outer * outer - inner * inner)),
+                Shape::Ring { normal, inner, outer, .. } => *normal * (PI * (outer * outer - inner * inner)),
                 Shape::Sphere { .. } | Shape::Cone { .. } | Shape::Torus { .. } => continue,
             };
             // Only what faces along an axis: slopes and rounded things tell nothing.
@@ -90,9 +82,7 @@ impl Scene {
             })
         };
         let middle = place([0.5, 0.5], EYE_HEIGHT);
-        let hits = sphere_directions(64)
-            .filter(|d| occluders.distance(middle, *d).is_finite())
-            .count();
+        let hits = sphere_directions(64).filter(|d| self.is_wall(occluders.nearest(middle, *d))).count();
         if hits as f64 >= CLOSED * 64.0 {
             let target = place([0.5, 0.5], 0.4);
             let near = CORNER_INSET;
@@ -101,15 +91,10 @@ impl Scene {
                 // Free sight along some directions about the middle: a cupboard before the eye shows nothing.
                 let ahead = unit(target - *eye);
                 let free = |d: DVec3| occluders.distance(*eye, d).min((high - low).length());
-                sphere_directions(32)
-                    .map(|d| free(unit(ahead + 0.6 * d)))
-                    .sum::<f64>()
+                sphere_directions(32).map(|d| free(unit(ahead + 0.6 * d))).sum::<f64>()
             };
-            let corners =
-                [[near, near], [far, near], [near, far], [far, far]].map(|c| place(c, EYE_HEIGHT));
-            let best = corners
-                .into_iter()
-                .max_by(|a, b| view(a).total_cmp(&view(b)));
+            let corners = [[near, near], [far, near], [near, far], [far, far]].map(|c| place(c, EYE_HEIGHT));
+            let best = corners.into_iter().max_by(|a, b| view(a).total_cmp(&view(b)));
             let eye = best.unwrap_or(middle);
             if (eye - target).length() > 0.0 {
                 return camera(eye, target, 70.0);
@@ -119,16 +104,8 @@ impl Scene {
         let fov_x = 45.0_f64;
         let half_height = ((fov_x.to_radians() * 0.5).tan() * 400.0 / 640.0).atan();
         let radius = ((high - low).length() * 0.5).max(f64::MIN_POSITIVE);
-        let side = if up == DVec3::Y {
-            DVec3::new(0.5, 0.4, 0.8)
-        } else {
-            DVec3::new(0.5, -0.8, 0.4)
-        };
-        camera(
-            center + unit(side) * (radius / half_height.sin()),
-            center,
-            fov_x,
-        )
+        let side = if up == DVec3::Y { DVec3::new(0.5, 0.4, 0.8) } else { DVec3::new(0.5, -0.8, 0.4) };
+        camera(center + unit(side) * (radius / half_height.sin()), center, fov_x)
     }
 
     /// A closed walk of so many cameras, evenly spaced in distance walked and angle turned, all with the picture size of
@@ -149,6 +126,16 @@ impl Scene {
         let up = self.up();
         let path = Path::new(&cameras, up);
         path.even(frames).into_iter().map(|t| path.at(t)).collect()
+    }
+
+    /// Whether what a ray from the middle hit speaks for a room around it: the front of a surface, or the back of a
+    /// two-sided one where there is light. Otherwise it is the inside of a solid.
+    fn is_wall(&self, hit: Option<Hit>) -> bool {
+        let lit = || !self.lights.is_empty() || self.materials.iter().any(|m| m.exitance != Rgb::ZERO);
+        hit.is_some_and(|h| {
+            let two_sided = self.materials.get(h.surface.material as usize).is_some_and(|m| m.two_sided);
+            h.front || two_sided && lit()
+        })
     }
 
     /// Cameras on an ellipse about the default camera.
@@ -175,26 +162,21 @@ impl Scene {
             }
             radius *= 0.7;
         }
-        ring(radius)
-            .map(|offset| Camera {
-                eye: (eye + offset).to_array(),
-                ..camera
-            })
-            .collect()
+        ring(radius).map(|offset| Camera { eye: (eye + offset).to_array(), ..camera }).collect()
     }
 
     /// The largest surfaces, for rays that ask for walls.
     fn occluders(&self) -> Occluders<'_> {
-        let mut shapes: Vec<&Shape> = self.surfaces.iter().map(|s| &s.shape).collect();
-        if shapes.len() > MAX_OCCLUDERS {
-            let size = |s: &Shape| {
-                let (low, high) = shape_bounds(s);
+        let mut surfaces: Vec<&Surface> = self.surfaces.iter().collect();
+        if surfaces.len() > MAX_OCCLUDERS {
+            let size = |s: &Surface| {
+                let (low, high) = shape_bounds(&s.shape);
                 (high - low).length()
             };
-            shapes.sort_by(|a, b| size(b).total_cmp(&size(a)));
-            shapes.truncate(MAX_OCCLUDERS);
+            surfaces.sort_by(|a, b| size(b).total_cmp(&size(a)));
+            surfaces.truncate(MAX_OCCLUDERS);
         }
-        Occluders(shapes)
+        Occluders(surfaces)
     }
 }
 
@@ -236,22 +218,10 @@ impl Path {
                 heading += wrapped(absolute - heading);
                 // Not quite straight up or down, where there is no heading.
                 let pitch = ahead.dot(up).clamp(-1.0, 1.0).asin().clamp(-1.55, 1.55);
-                Key {
-                    eye: camera.eye.into(),
-                    heading,
-                    pitch,
-                    reach: view.length(),
-                    fov_x: camera.fov_x,
-                }
+                Key { eye: camera.eye.into(), heading, pitch, reach: view.length(), fov_x: camera.fov_x }
             })
             .collect();
-        Self {
-            keys,
-            up,
-            ground,
-            width: cameras[0].width,
-            height: cameras[0].height,
-        }
+        Self { keys, up, ground, width: cameras[0].width, height: cameras[0].height }
     }
 
     /// Key `k` of the endless path, whose heading goes on turning where one round is a full turn.
@@ -261,10 +231,7 @@ impl Path {
         let last = self.keys[self.keys.len() - 1];
         let turn = last.heading + wrapped(first.heading - last.heading) - first.heading;
         let key = self.keys[k.rem_euclid(n) as usize];
-        Key {
-            heading: key.heading + turn * k.div_euclid(n) as f64,
-            ..key
-        }
+        Key { heading: key.heading + turn * k.div_euclid(n) as f64, ..key }
     }
 
     /// The camera at `t` in 0…number of keys.
@@ -303,10 +270,7 @@ impl Path {
         let reach = self.keys.iter().map(|k| k.reach).sum::<f64>() / self.keys.len() as f64;
         let view = |step: usize| {
             let camera = self.at(step as f64 / STEPS as f64);
-            (
-                DVec3::from(camera.eye),
-                unit(DVec3::from(camera.target) - DVec3::from(camera.eye)),
-            )
+            (DVec3::from(camera.eye), unit(DVec3::from(camera.target) - DVec3::from(camera.eye)))
         };
         let mut walked = Vec::with_capacity(total_steps + 1);
         walked.push(0.0);
@@ -320,9 +284,7 @@ impl Path {
         (0..frames)
             .map(|frame| {
                 let wanted = sum * frame as f64 / frames as f64;
-                let step = walked
-                    .partition_point(|w| *w <= wanted)
-                    .clamp(1, total_steps);
+                let step = walked.partition_point(|w| *w <= wanted).clamp(1, total_steps);
                 let (a, b) = (walked[step - 1], walked[step]);
                 let part = if b > a { (wanted - a) / (b - a) } else { 0.0 };
                 ((step - 1) as f64 + part) / STEPS as f64
@@ -349,16 +311,8 @@ fn sphere_directions(count: u32) -> impl Iterator<Item = DVec3> {
 
 fn shape_bounds(shape: &Shape) -> (DVec3, DVec3) {
     let of = |points: &[DVec3], pad: f64| {
-        let low = points
-            .iter()
-            .copied()
-            .reduce(DVec3::min)
-            .unwrap_or_default();
-        let high = points
-            .iter()
-            .copied()
-            .reduce(DVec3::max)
-            .unwrap_or_default();
+        let low = points.iter().copied().reduce(DVec3::min).unwrap_or_default();
+        let high = points.iter().copied().reduce(DVec3::max).unwrap_or_default();
         (low - DVec3::splat(pad), high + DVec3::splat(pad))
     };
     match shape {
@@ -367,64 +321,59 @@ fn shape_bounds(shape: &Shape) -> (DVec3, DVec3) {
         Shape::Sphere { center, radius } => of(&[*center], *radius),
         Shape::Cone { ends, radii } => of(ends, radii[0].max(radii[1])),
         Shape::Ring { center, outer, .. } => of(&[*center], *outer),
-        Shape::Torus {
-            center,
-            major,
-            minor,
-            ..
-        } => of(&[*center], major + minor),
+        Shape::Torus { center, major, minor, .. } => of(&[*center], major + minor),
     }
 }
 
 /// Surfaces that stop rays.
-struct Occluders<'a>(Vec<&'a Shape>);
+struct Occluders<'a>(Vec<&'a Surface>);
 
-impl Occluders<'_> {
-    /// Distance along a unit direction to the nearest surface; infinite where there is none. Cones and tori are
-    /// passed through: nobody builds a wall of them.
+/// What a ray meets first.
+struct Hit<'a> {
+    surface: &'a Surface,
+    distance: f64,
+    /// Whether it meets the front.
+    front: bool,
+}
+
+impl<'a> Occluders<'a> {
+    /// Distance along a unit direction to the nearest surface; infinite where there is none.
     fn distance(&self, origin: DVec3, direction: DVec3) -> f64 {
-        let mut nearest = f64::INFINITY;
-        for shape in &self.0 {
-            let t = match shape {
-                Shape::Triangle(p) => polygon_distance(p, origin, direction),
-                Shape::Quad(p) => polygon_distance(p, origin, direction),
+        self.nearest(origin, direction).map_or(f64::INFINITY, |hit| hit.distance)
+    }
+
+    /// The nearest surface along a unit direction. Cones and tori are passed through: nobody builds a wall of them.
+    fn nearest(&self, origin: DVec3, direction: DVec3) -> Option<Hit<'a>> {
+        let mut nearest: Option<Hit<'a>> = None;
+        for &surface in &self.0 {
+            let (distance, front) = match &surface.shape {
+                Shape::Triangle(p) => polygon_hit(p, origin, direction),
+                Shape::Quad(p) => polygon_hit(p, origin, direction),
                 Shape::Sphere { center, radius } => {
                     let to = *center - origin;
                     let (middle, gap) = (to.dot(direction), to.length_squared() - radius * radius);
                     let half = (middle * middle - gap).sqrt();
-                    if gap > 0.0 {
-                        middle - half
-                    } else {
-                        middle + half
-                    }
+                    let outside = gap > 0.0;
+                    (if outside { middle - half } else { middle + half }, outside)
                 }
-                Shape::Ring {
-                    center,
-                    normal,
-                    inner,
-                    outer,
-                } => {
+                Shape::Ring { center, normal, inner, outer } => {
                     let t = (*center - origin).dot(*normal) / direction.dot(*normal);
                     let r = (origin + direction * t - *center).length();
-                    if (*inner..=*outer).contains(&r) {
-                        t
-                    } else {
-                        f64::INFINITY
-                    }
+                    (if (*inner..=*outer).contains(&r) { t } else { f64::INFINITY }, direction.dot(*normal) < 0.0)
                 }
                 Shape::Cone { .. } | Shape::Torus { .. } => continue,
             };
             // False for NaN too: no hit.
-            if t > 0.0 && t < nearest {
-                nearest = t;
+            if distance > 0.0 && distance < nearest.as_ref().map_or(f64::INFINITY, |hit| hit.distance) {
+                nearest = Some(Hit { surface, distance, front: front != surface.flip });
             }
         }
         nearest
     }
 }
 
-/// Distance to a convex polygon, or NaN or infinity.
-fn polygon_distance(corners: &[DVec3], origin: DVec3, direction: DVec3) -> f64 {
+/// Distance to a convex polygon (NaN or infinity where the ray passes it), and whether the ray comes from its front.
+fn polygon_hit(corners: &[DVec3], origin: DVec3, direction: DVec3) -> (f64, bool) {
     let (mut inside, mut outside) = (true, true);
     let mut last = corners[corners.len() - 1] - origin;
     for corner in corners {
@@ -435,10 +384,11 @@ fn polygon_distance(corners: &[DVec3], origin: DVec3, direction: DVec3) -> f64 {
         last = next;
     }
     if !inside && !outside {
-        return f64::INFINITY;
+        return (f64::INFINITY, false);
     }
     let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    (corners[0] - origin).dot(normal) / direction.dot(normal)
+    let toward = direction.dot(normal);
+    ((corners[0] - origin).dot(normal) / toward, toward < 0.0)
 }
 
 #[cfg(test)]
@@ -446,7 +396,6 @@ mod tests {
     use super::*;
     use crate::builtin;
     use crate::builtin::tests::grey;
-    use hr_diffuse::Surface;
 
     fn without_cameras(name: &str) -> Scene {
         let mut scene = builtin::scene(name).expect("a built-in scene");
@@ -456,34 +405,17 @@ mod tests {
 
     fn object(shape: Shape) -> Scene {
         let materials = vec![grey("grey", true, 0.0)];
-        Scene {
-            name: "object.obj".into(),
-            surfaces: vec![Surface::new(shape, 0)],
-            materials,
-            ..Scene::default()
-        }
+        Scene { name: "object.obj".into(), surfaces: vec![Surface::new(shape, 0)], materials, ..Scene::default() }
     }
 
     #[test]
     fn floors_tell_where_up_is() {
-        assert_eq!(
-            without_cameras("room").up(),
-            DVec3::Z,
-            "the room stands on the xy plane"
-        );
-        assert_eq!(
-            without_cameras("empty-room").up(),
-            DVec3::Y,
-            "this room stands on the xz plane"
-        );
+        assert_eq!(without_cameras("room").up(), DVec3::Z, "the room stands on the xy plane");
+        assert_eq!(without_cameras("empty-room").up(), DVec3::Y, "this room stands on the xz plane");
         let mut file = without_cameras("room");
         file.name = "flat.GLB".into();
         assert_eq!(file.up(), DVec3::Y, "glTF says y");
-        assert_eq!(
-            builtin::scene("cornell").expect("there").up(),
-            DVec3::Y,
-            "the camera says y"
-        );
+        assert_eq!(builtin::scene("cornell").expect("there").up(), DVec3::Y, "the camera says y");
     }
 
     #[test]
@@ -494,41 +426,27 @@ mod tests {
             camera.check(name).expect("usable");
             let (low, high) = scene.bounds().expect("surfaces");
             let eye = DVec3::from(camera.eye);
-            assert!(
-                eye.cmpgt(low).all() && eye.cmplt(high).all(),
-                "{name}: {eye} is inside {low} {high}"
-            );
+            assert!(eye.cmpgt(low).all() && eye.cmplt(high).all(), "{name}: {eye} is inside {low} {high}");
             let free = scene.occluders().distance(eye, camera.frame().2);
-            assert!(
-                free > 0.1 * (high - low).length(),
-                "{name}: {free} of free sight"
-            );
+            assert!(free > 0.1 * (high - low).length(), "{name}: {free} of free sight");
         }
-        let sphere = object(Shape::Sphere {
-            center: DVec3::new(5.0, 6.0, 7.0),
-            radius: 2.0,
-        });
+        let sphere = object(Shape::Sphere { center: DVec3::new(5.0, 6.0, 7.0), radius: 2.0 });
         let camera = sphere.default_camera();
         camera.check("object").expect("usable");
         let distance = (DVec3::from(camera.eye) - DVec3::new(5.0, 6.0, 7.0)).length();
-        assert!(
-            distance > 4.0 && distance < 40.0,
-            "outside, not too far: {distance}"
-        );
+        assert!(distance > 4.0 && distance < 40.0, "outside, not too far: {distance}");
     }
 
     #[test]
     fn walks_are_closed_even_and_usable() {
         let mut single = builtin::scene("cornell").expect("there");
         single.cameras.truncate(1);
-        let sphere = object(Shape::Sphere {
-            center: DVec3::ZERO,
-            radius: 1.0,
-        });
-        let scenes = builtin::NAMES
-            .iter()
-            .map(|n| builtin::scene(n).expect("there"))
-            .chain([single, without_cameras("room"), sphere]);
+        let sphere = object(Shape::Sphere { center: DVec3::ZERO, radius: 1.0 });
+        let scenes = builtin::NAMES.iter().map(|n| builtin::scene(n).expect("there")).chain([
+            single,
+            without_cameras("room"),
+            sphere,
+        ]);
         for scene in scenes {
             let name = &scene.name;
             let walk = scene.walkthrough(240);
@@ -548,10 +466,7 @@ mod tests {
             }
             for (moved, turned) in steps {
                 // 240 frames for a round: no frame leaps farther than a few times the mean.
-                assert!(
-                    moved < 0.1 * reach && turned < 0.12,
-                    "{name}: smooth: {moved} of {reach}, {turned}"
-                );
+                assert!(moved < 0.1 * reach && turned < 0.12, "{name}: smooth: {moved} of {reach}, {turned}");
             }
         }
     }
@@ -563,27 +478,11 @@ mod tests {
             let (low, high) = scene.bounds().expect("surfaces");
             let walk = scene.walkthrough(100);
             let eyes = walk.iter().map(|c| DVec3::from(c.eye));
-            assert!(
-                eyes.clone()
-                    .all(|e| e.cmpgt(low).all() && e.cmplt(high).all()),
-                "{name}: within the walls"
-            );
-            let spread = eyes
-                .clone()
-                .map(|e| (e - DVec3::from(walk[0].eye)).length())
-                .fold(0.0, f64::max);
-            assert!(
-                spread > 0.05 * (high - low).length(),
-                "{name}: it does move: {spread}"
-            );
+            assert!(eyes.clone().all(|e| e.cmpgt(low).all() && e.cmplt(high).all()), "{name}: within the walls");
+            let spread = eyes.clone().map(|e| (e - DVec3::from(walk[0].eye)).length()).fold(0.0, f64::max);
+            assert!(spread > 0.05 * (high - low).length(), "{name}: it does move: {spread}");
         }
-        assert!(
-            builtin::scene("room")
-                .expect("there")
-                .walkthrough(0)
-                .is_empty(),
-            "no frames, no cameras"
-        );
+        assert!(builtin::scene("room").expect("there").walkthrough(0).is_empty(), "no frames, no cameras");
     }
 
     #[test]
@@ -592,30 +491,13 @@ mod tests {
         let mut scene = builtin::scene("furnace").expect("there");
         let camera = scene.cameras[0].1;
         scene.cameras = vec![
-            (
-                "a".into(),
-                Camera {
-                    eye: [-0.5, 0.0, 0.0],
-                    target: [0.5, 0.0, 0.0],
-                    ..camera
-                },
-            ),
-            (
-                "b".into(),
-                Camera {
-                    eye: [0.5, 0.0, 0.0],
-                    target: [-0.5, 0.0, 0.0],
-                    ..camera
-                },
-            ),
+            ("a".into(), Camera { eye: [-0.5, 0.0, 0.0], target: [0.5, 0.0, 0.0], ..camera }),
+            ("b".into(), Camera { eye: [0.5, 0.0, 0.0], target: [-0.5, 0.0, 0.0], ..camera }),
         ];
         for camera in scene.walkthrough(64) {
             camera.check("walk").expect("usable");
             let reach = (DVec3::from(camera.target) - DVec3::from(camera.eye)).length();
-            assert!(
-                (reach - 1.0).abs() < 1e-9,
-                "the target stays a metre away: {reach}"
-            );
+            assert!((reach - 1.0).abs() < 1e-9, "the target stays a metre away: {reach}");
         }
     }
 }

@@ -13,14 +13,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// # Errors
 /// [`SceneError::Io`] with `path` where the folder cannot be written to, the disk is full, or `fill` fails; nothing is
 /// left behind then.
-pub fn write_whole(
-    path: &Path,
-    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<(), SceneError> {
-    write(path, fill).map_err(|source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    })
+pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), SceneError> {
+    write(path, fill).map_err(|source| SceneError::Io { path: path.to_owned(), source })
 }
 
 fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
@@ -40,9 +34,7 @@ fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>)
     let mut out = BufWriter::new(file);
     fill(&mut out)?;
     // Data first, name after: a crash in between must not leave an empty file under the final name.
-    out.into_inner()
-        .map_err(io::IntoInnerError::into_error)?
-        .sync_all()?;
+    out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
     fs::rename(&partial.0, &place)
 }
 
@@ -54,10 +46,7 @@ impl Partial {
     fn create(place: &Path) -> io::Result<(File, Self)> {
         static COUNTER: AtomicU32 = AtomicU32::new(0);
         let Some(name) = place.file_name() else {
-            return Err(io::Error::new(
-                io::ErrorKind::InvalidInput,
-                "this names no file",
-            ));
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "this names no file"));
         };
         loop {
             let number = COUNTER.fetch_add(1, Ordering::Relaxed);
@@ -96,15 +85,8 @@ mod tests {
             Err(io::Error::other("disk full"))
         })
         .expect_err("the writer fails");
-        assert!(
-            error.to_string().ends_with("a.bin: disk full"),
-            "'{error}' names file and cause"
-        );
-        assert_eq!(
-            fs::read(&path).expect("still there"),
-            b"old",
-            "the old contents survive"
-        );
+        assert!(error.to_string().ends_with("a.bin: disk full"), "'{error}' names file and cause");
+        assert_eq!(fs::read(&path).expect("still there"), b"old", "the old contents survive");
         assert_eq!(folder.names(), ["a.bin"], "no partial file is left");
         write_whole(&path, |out| out.write_all(b"new")).expect("a second file");
         assert_eq!(fs::read(&path).expect("there"), b"new", "replaced");
@@ -114,11 +96,7 @@ mod tests {
     #[test]
     fn impossible_places_are_errors() {
         let folder = Folder::new("whole-file-places");
-        for path in [
-            folder.path("no/such/folder/a.bin"),
-            folder.path(""),
-            folder.path("x/.."),
-        ] {
+        for path in [folder.path("no/such/folder/a.bin"), folder.path(""), folder.path("x/..")] {
             write_whole(&path, |out| out.write_all(b"x")).expect_err("cannot be written");
         }
         assert!(folder.names().is_empty(), "nothing is left");
@@ -130,18 +108,8 @@ mod tests {
         let folder = Folder::new("whole-file-links");
         write_whole(&folder.path("real"), |out| out.write_all(b"old")).expect("a first file");
         std::os::unix::fs::symlink("real", folder.path("link")).expect("a link");
-        write_whole(&folder.path("link"), |out| out.write_all(b"new"))
-            .expect("written through the link");
-        assert_eq!(
-            fs::read(folder.path("real")).expect("there"),
-            b"new",
-            "the target has the new contents"
-        );
-        assert!(
-            fs::symlink_metadata(folder.path("link"))
-                .expect("there")
-                .is_symlink(),
-            "the link is still one"
-        );
+        write_whole(&folder.path("link"), |out| out.write_all(b"new")).expect("written through the link");
+        assert_eq!(fs::read(folder.path("real")).expect("there"), b"new", "the target has the new contents");
+        assert!(fs::symlink_metadata(folder.path("link")).expect("there").is_symlink(), "the link is still one");
     }
 }

@@ -25,38 +25,22 @@ pub(super) struct Paint {
 impl Paint {
     /// Diffuse, two-sided.
     pub(super) fn diffuse(rd: Rgb) -> Self {
-        Self {
-            rd,
-            rs: Rgb::ZERO,
-            alpha: 0.0,
-            exitance: Rgb::ZERO,
-            two_sided: true,
-        }
+        Self { rd, rs: Rgb::ZERO, alpha: 0.0, exitance: Rgb::ZERO, two_sided: true }
     }
 
     /// Diffuse with a glossy lobe, two-sided.
     pub(super) fn glossy(rd: Rgb, rs: Rgb, alpha: f32) -> Self {
-        Self {
-            rs,
-            alpha,
-            ..Self::diffuse(rd)
-        }
+        Self { rs, alpha, ..Self::diffuse(rd) }
     }
 
     /// A light that reflects nothing, two-sided as far as that can be told.
     pub(super) fn light(exitance: Rgb) -> Self {
-        Self {
-            exitance,
-            ..Self::diffuse(Rgb::ZERO)
-        }
+        Self { exitance, ..Self::diffuse(Rgb::ZERO) }
     }
 
     /// The front of a closed solid: its inside is nowhere to be seen.
     pub(super) fn solid(self) -> Self {
-        Self {
-            two_sided: false,
-            ..self
-        }
+        Self { two_sided: false, ..self }
     }
 }
 
@@ -105,10 +89,7 @@ impl Reflector for Interim {
         Rgb::ZERO
     }
     fn lobe(&self, _: glam::Vec3) -> glossy_ext::Lobe {
-        glossy_ext::Lobe {
-            direction: glam::Vec3::Z,
-            width: std::f32::consts::FRAC_PI_2,
-        }
+        glossy_ext::Lobe { direction: glam::Vec3::Z, width: std::f32::consts::FRAC_PI_2 }
     }
     fn sample(&self, _: glam::Vec3, _: glam::Vec2) -> Option<glossy_ext::Sample> {
         None
@@ -135,13 +116,7 @@ pub(super) struct Builder {
 
 impl Builder {
     pub(super) fn new(name: &str) -> Self {
-        Self {
-            scene: Scene {
-                name: name.to_owned(),
-                ..Scene::default()
-            },
-            frame: DAffine3::IDENTITY,
-        }
+        Self { scene: Scene { name: name.to_owned(), ..Scene::default() }, frame: DAffine3::IDENTITY }
     }
 
     pub(super) fn done(self) -> Scene {
@@ -155,10 +130,7 @@ impl Builder {
     }
 
     fn surface(&mut self, material: u32, shape: Shape, flip: bool) {
-        self.scene.surfaces.push(Surface {
-            flip,
-            ..Surface::new(shape, material)
-        });
+        self.scene.surfaces.push(Surface { flip, ..Surface::new(shape, material) });
     }
 
     fn point(&self, p: DVec3) -> DVec3 {
@@ -182,26 +154,11 @@ impl Builder {
     }
 
     /// Adds a rectangle about `center` that faces `normal`; its height runs along `up`.
-    pub(super) fn patch(
-        &mut self,
-        material: u32,
-        center: DVec3,
-        normal: DVec3,
-        up: DVec3,
-        size: DVec2,
-    ) {
+    pub(super) fn patch(&mut self, material: u32, center: DVec3, normal: DVec3, up: DVec3, size: DVec2) {
         let normal = unit(normal);
         let across = unit(up.cross(normal));
         let (a, b) = (across * size.x / 2.0, normal.cross(across) * size.y / 2.0);
-        self.quad(
-            material,
-            [
-                center - a - b,
-                center + a - b,
-                center + a + b,
-                center - a + b,
-            ],
-        );
+        self.quad(material, [center - a - b, center + a - b, center + a + b, center - a + b]);
     }
 
     /// Adds a sphere.
@@ -217,53 +174,23 @@ impl Builder {
     }
 
     /// Adds a torus.
-    pub(super) fn torus(
-        &mut self,
-        material: u32,
-        center: DVec3,
-        axis: DVec3,
-        major: f64,
-        minor: f64,
-    ) {
+    pub(super) fn torus(&mut self, material: u32, center: DVec3, axis: DVec3, major: f64, minor: f64) {
         let (center, axis) = (self.point(center), self.vector(axis));
-        self.surface(
-            material,
-            Shape::Torus {
-                center,
-                axis,
-                major,
-                minor,
-            },
-            false,
-        );
+        self.surface(material, Shape::Torus { center, axis, major, minor }, false);
     }
 
     /// Adds what a profile of points (radius, height) sweeps about a unit axis: cones, cylinders, rings and disks. The
     /// solid lies to the left of the way along the profile: upward on the outside, inward on the top, downward on the
     /// inside of a hollow.
-    pub(super) fn lathe(
-        &mut self,
-        material: u32,
-        base: DVec3,
-        axis: DVec3,
-        profile: &[(f64, f64)],
-    ) {
+    pub(super) fn lathe(&mut self, material: u32, base: DVec3, axis: DVec3, profile: &[(f64, f64)]) {
         let (base, axis) = (self.point(base), self.vector(axis));
         for pair in profile.windows(2) {
             let [(r0, z0), (r1, z1)] = [pair[0], pair[1]];
             let shape = if z0 == z1 {
                 let normal = if r1 < r0 { axis } else { -axis };
-                Shape::Ring {
-                    center: base + axis * z0,
-                    normal,
-                    inner: r0.min(r1),
-                    outer: r0.max(r1),
-                }
+                Shape::Ring { center: base + axis * z0, normal, inner: r0.min(r1), outer: r0.max(r1) }
             } else {
-                Shape::Cone {
-                    ends: [base + axis * z0, base + axis * z1],
-                    radii: [r0, r1],
-                }
+                Shape::Cone { ends: [base + axis * z0, base + axis * z1], radii: [r0, r1] }
             };
             self.surface(material, shape, z1 < z0);
         }
@@ -272,13 +199,7 @@ impl Builder {
     /// Adds a box between two corners, facing outward, without the faces in `skipped`.
     pub(super) fn block(&mut self, material: u32, low: [f64; 3], high: [f64; 3], skipped: u8) {
         let corner = |k: usize| {
-            DVec3::from_array(std::array::from_fn(|axis| {
-                if k >> axis & 1 == 0 {
-                    low[axis]
-                } else {
-                    high[axis]
-                }
-            }))
+            DVec3::from_array(std::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] }))
         };
         // Corner numbers count x, y, z as bits 0, 1, 2.
         for (face, corners) in [
