@@ -6,4 +6,4 @@ pub mod haar;
 pub mod reflector;
 
 pub use hr_diffuse::Rgb;
-pub use reflector::{Lobe, Reflector, Sample};
+pub use reflector::{Incident, Lambert, Lobe, MetallicRoughness, Phong, Reflector, ReflectorError, Sample, Sum, Ward};
