@@ -2,15 +2,23 @@
 
 pub mod builtin;
 pub mod camera;
+pub mod color;
 pub mod error;
+mod finish;
 pub mod gltf_file;
 pub mod image_file;
 pub mod mgf;
 pub mod obj_file;
 pub mod scene;
+#[cfg(test)]
+mod testing;
 pub mod tonemap;
+mod viewpoint;
+pub mod whole_file;
 
 pub use camera::Camera;
 pub use error::SceneError;
-// pub use image_file::Image;
+pub use glossy_ext::Rgb;
+pub use image_file::{Image, ImageKind};
 pub use scene::{Material, Primaries, Scene, SurfaceAttributes, Texture, Warning};
+pub use tonemap::{Exposure, ToneMap};

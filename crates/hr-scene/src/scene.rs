@@ -1,9 +1,10 @@
 //! A loaded scene: surfaces for the light transport, materials and textures for the eye, cameras, warnings.
 
-use crate::Camera;
+use crate::{Camera, SceneError, builtin, gltf_file, mgf, obj_file};
 use glam::{Mat3, Vec2};
 use glossy_ext::{Reflector, Rgb};
-use hr_diffuse::{Light, Surface};
+use hr_diffuse::{DiffuseMaterial, Light, SceneInput, Surface};
+use std::path::Path;
 use std::sync::Arc;
 
 /// The RGB primaries of a scene's colours; both have a white that keeps grey at (1, 1, 1).
@@ -109,4 +110,76 @@ pub struct Scene {
     pub primaries: Primaries,
     /// What was mended or left out.
     pub warnings: Vec<Warning>,
+}
+
+impl Scene {
+    /// Loads a scene file by its extension (`.mgf`, `.gltf`, `.glb`, `.obj`, in capitals or not), or makes the
+    /// [built-in scene](builtin) of that name, and [finishes](Self::finish) it.
+    ///
+    /// # Errors
+    /// [`SceneError::Unknown`] for a name that is neither; else what the reader of the file or
+    /// [`finish`](Self::finish) says.
+    pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
+        let path = Path::new(name_or_path);
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let scene = match extension.as_str() {
+            "mgf" => mgf::load(path)?,
+            "gltf" | "glb" => gltf_file::load(path)?,
+            "obj" => obj_file::load(path)?,
+            _ => builtin::scene(name_or_path).ok_or_else(|| SceneError::Unknown {
+                name: name_or_path.to_owned(),
+                known: builtin::NAMES.join(", "),
+            })?,
+        };
+        scene.finish()
+    }
+
+    /// What the diffuse engine needs of this scene: its surfaces and lights, and of each material the Lambertian share.
+    #[must_use]
+    pub fn input(&self) -> SceneInput {
+        let diffuse = |m: &Material| DiffuseMaterial {
+            reflectance: m.reflector.diffuse(),
+            exitance: m.exitance,
+            two_sided: m.two_sided,
+        };
+        SceneInput {
+            surfaces: self.surfaces.clone(),
+            materials: self.materials.iter().map(diffuse).collect(),
+            lights: self.lights.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknown_names_list_the_known_ones() {
+        for name in ["", "rooom", "scene.blend", "no/such/folder", "room.png"] {
+            let error = Scene::load(name).expect_err("unknown");
+            assert!(matches!(error, SceneError::Unknown { .. }), "{name}: {error}");
+            let text = error.to_string();
+            assert!(text.contains(&format!("'{name}'")) && text.contains("room, three-lights"), "{text}");
+        }
+    }
+
+    #[test]
+    fn missing_files_are_named() {
+        for name in ["no-such.mgf", "no-such.GLTF", "no-such.glb", "no-such.obj"] {
+            let error = Scene::load(name).expect_err("there is no such file").to_string();
+            assert!(error.contains(name), "{error}");
+        }
+    }
+
+    #[test]
+    fn input_has_the_lambertian_share() {
+        let scene = Scene::load("furnace").expect("built in");
+        let input = scene.input();
+        assert_eq!(input.surfaces, scene.surfaces, "all surfaces");
+        let [wall] = input.materials[..] else { panic!("one material: {:?}", input.materials) };
+        assert_eq!(wall.reflectance, Rgb::new(0.2, 0.5, 0.8), "reflectance");
+        assert_eq!(wall.exitance, Rgb::new(1.0, 2.0, 3.0), "exitance");
+        assert!(wall.two_sided, "sides");
+    }
 }
