@@ -5,12 +5,17 @@ pub mod camera;
 pub mod error;
 pub mod gltf_file;
 pub mod image_file;
+mod mesh;
 pub mod mgf;
 pub mod obj_file;
+mod placeholder;
 pub mod scene;
+pub mod texture;
 pub mod tonemap;
+mod warnings;
 
 pub use camera::Camera;
 pub use error::SceneError;
 // pub use image_file::Image;
-pub use scene::{Material, Primaries, Scene, SurfaceAttributes, Texture, Warning};
+pub use scene::{Material, Primaries, Scene, Warning};
+pub use texture::{SurfaceAttributes, Texels, Texture, Wrap};
