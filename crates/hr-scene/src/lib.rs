@@ -7,8 +7,10 @@ pub mod error;
 mod finish;
 pub mod gltf_file;
 pub mod image_file;
+mod mesh;
 pub mod mgf;
 pub mod obj_file;
+mod placeholder;
 pub mod scene;
 #[cfg(test)]
 mod testing;

@@ -30,54 +30,8 @@ pub struct Material {
     pub two_sided: bool,
     /// Base colour texture and the factor that multiplies it.
     pub texture: Option<Texture>,
-    /// Linear base colour factor that textures and vertex colours multiply; white where neither is used.
+    /// Linear base colour factor that textures and vertex colours multiply; not looked at where neither is there.
     pub base_color: Rgb,
-}
-
-/// A base colour texture.
-#[derive(Clone, Debug)]
-pub struct Texture {
-    /// Linear RGB texels, row 0 first, shared among materials.
-    pub texels: Arc<Texels>,
-    /// Transform of texture coordinates (`KHR_texture_transform`), applied before wrapping.
-    pub transform: Mat3,
-    /// What happens outside 0…1 in u and v.
-    pub wrap: [Wrap; 2],
-}
-
-/// Texels in linear RGB.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Texels {
-    /// Width in texels, ≥ 1.
-    pub width: u32,
-    /// Height in texels, ≥ 1.
-    pub height: u32,
-    /// `width · height` linear colours, row 0 first.
-    pub data: Vec<Rgb>,
-}
-
-/// What a texture does outside 0…1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Wrap {
-    /// Starts anew.
-    #[default]
-    Repeat,
-    /// Starts anew, every second time mirrored.
-    Mirror,
-    /// Keeps the colour of the border.
-    Clamp,
-}
-
-/// What varies over a surface beside its geometry, for textured or vertex-coloured surfaces only. Corners as in
-/// the surface's shape.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfaceAttributes {
-    /// Index of the surface in [`Scene::surfaces`].
-    pub surface: u32,
-    /// Texture coordinates at the corners.
-    pub uv: [Vec2; 4],
-    /// Linear vertex colours at the corners.
-    pub color: [Rgb; 4],
 }
 
 /// Something that was mended or left out while loading.
