@@ -6,8 +6,8 @@
 //! are two elements. Lights without extent are leaves that only send.
 
 use crate::geometry::{Domain, Geometry};
-use crate::hooks::{Hierarchy, NodeId};
-use crate::scene::Light;
+use crate::hooks::{FLAT_COSINE, Hierarchy, NodeId};
+use crate::scene::{Light, LightKind};
 use crate::visibility::Visibility;
 use crate::{Cone, DiffuseMaterial, Rgb, SurfaceReflectance};
 use glam::{Vec2, Vec3, Vec3A};
@@ -79,7 +79,7 @@ impl Element {
     /// Whether all of the node lies in one plane, so that irradiance has one cosine.
     #[must_use]
     pub fn is_flat(&self) -> bool {
-        self.normals.cos_angle > 0.9999 && self.kind != Kind::Cluster
+        self.normals.cos_angle > FLAT_COSINE && self.kind != Kind::Cluster
     }
 
     /// Whether it is a whole sphere seen from outside: the same from everywhere.
@@ -373,7 +373,12 @@ fn patch(scene: &SceneData, surface: u32, kind: Kind, domain: Domain, glossy: Op
 
 fn light(scene: &SceneData, index: u32) -> Element {
     let at = scene.light_positions[index as usize];
-    Element { kind: Kind::Light, bounds: [at; 2], center: at, source: index, ..EMPTY }
+    // A light without extent has no normals; the direction in which distant light travels stands there.
+    let mean_normal = match scene.lights[index as usize].kind {
+        LightKind::Directional { direction } => direction,
+        _ => Vec3::ZERO,
+    };
+    Element { kind: Kind::Light, bounds: [at; 2], center: at, source: index, mean_normal, ..EMPTY }
 }
 
 /// A tree of elements before it is laid out.
@@ -466,5 +471,21 @@ impl Hierarchy for Elements {
     fn material(&self, node: NodeId) -> Option<u32> {
         let e = &self.nodes[node.index()];
         e.is_patch().then_some(e.material)
+    }
+    fn direction_to(&self, sender: NodeId, at: Vec3) -> (Vec3, f32) {
+        let e = &self.nodes[sender.index()];
+        if self.is_distant(sender) {
+            return (-e.mean_normal, 0.0);
+        }
+        let to = e.center - at;
+        let d2 = to.length_squared().max(1e-20);
+        let direction = to / d2.sqrt();
+        // Solid angle over π, no more than that of the bounding ball.
+        let share = (e.area * e.mean_cosine(-direction) / std::f32::consts::PI).min(e.radius * e.radius) / d2;
+        (direction, share.min(1.0).sqrt().asin())
+    }
+    fn is_distant(&self, sender: NodeId) -> bool {
+        let e = &self.nodes[sender.index()];
+        e.kind == Kind::Light && e.mean_normal != Vec3::ZERO
     }
 }

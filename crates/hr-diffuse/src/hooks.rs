@@ -48,13 +48,25 @@ pub trait Hierarchy: Sync {
     fn area(&self, node: NodeId) -> f32;
     /// Material of an element of a surface; `None` for clusters and for lights without extent.
     fn material(&self, node: NodeId) -> Option<u32>;
-    /// Unit direction toward a sender as seen from `at`, and the angular radius of the sender in radians.
+    /// Unit direction toward a sender as seen from `at`, and the angular radius (radians) of a disk that subtends
+    /// the same solid angle as the sender.
     fn direction_to(&self, sender: NodeId, at: Vec3) -> (Vec3, f32) {
         let to = self.center(sender) - at;
         let distance = to.length().max(f32::MIN_POSITIVE);
         (to / distance, (self.radius(sender) / distance).min(1.0).asin())
     }
+    /// Whether a sender is infinitely far: its direction is the same from everywhere.
+    fn is_distant(&self, _sender: NodeId) -> bool {
+        false
+    }
+    /// Whether the node is a part of one plane, so that all of it is oriented alike.
+    fn is_flat(&self, node: NodeId) -> bool {
+        self.material(node).is_some() && self.normals(node).cos_angle > FLAT_COSINE
+    }
 }
+
+/// Normals within this cosine (0.8°) count as one.
+pub const FLAT_COSINE: f32 = 0.9999;
 
 /// One link's light as it arrives at the receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]

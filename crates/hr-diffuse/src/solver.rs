@@ -3,7 +3,7 @@
 use crate::error::SolveError;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
-use crate::hooks::{LightField, NodeId, Transfer};
+use crate::hooks::{Hierarchy, LightField, NodeId, Transfer};
 use crate::links::Links;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::stats::Stats;
@@ -556,7 +556,7 @@ impl<L: LightField> Solver<L> {
 pub(crate) fn renewed<L: LightField>(light: Light<'_, L>, transfer: &Transfer, at: Vec3, node: u32) -> (Vec3, f32) {
     let sender = light.element(transfer.sender.0);
     let direction = light.direction_to(at, transfer.sender.0);
-    if sender.kind == Kind::Light && matches!(light.scene.lights[sender.source as usize].kind, LightKind::Directional { .. }) {
+    if light.elements.is_distant(transfer.sender) {
         return (direction, 1.0);
     }
     let before = light.element(node).center.distance_squared(sender.center);

@@ -2,7 +2,7 @@
 
 use crate::form_factor;
 use crate::hierarchy::{Element, Elements, Kind, SceneData, mean_cosine};
-use crate::hooks::{LightField, NodeId};
+use crate::hooks::{Hierarchy, LightField, NodeId};
 use crate::oracle::spot_ramp;
 use crate::{Cone, LightKind, Rgb};
 use glam::Vec3;
@@ -182,14 +182,12 @@ impl<L: LightField> Light<'_, L> {
         self.emitted(sender, away) * factor
     }
 
-    /// Unit direction from `x` toward a sender; for directional light against its direction.
+    /// Unit direction from `x` toward a sender; for distant light against its direction.
     #[must_use]
     pub fn direction_to(&self, x: Vec3, sender: u32) -> Vec3 {
         let element = self.element(sender);
-        if element.kind == Kind::Light {
-            if let LightKind::Directional { direction } = self.scene.lights[element.source as usize].kind {
-                return -direction;
-            }
+        if self.elements.is_distant(NodeId(sender)) {
+            return -element.mean_normal;
         }
         (element.center - x).normalize_or(Vec3::Z)
     }
