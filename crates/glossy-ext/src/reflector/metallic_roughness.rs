@@ -25,8 +25,8 @@ use std::sync::Arc;
 /// is part of [`glossy`](Reflector::glossy). It is a little positive around the back-scattering direction and negative at
 /// grazing forward scattering; its mean is 0.
 ///
-/// The albedo of a white dielectric exceeds 1 near grazing directions, by at most 8 % for smooth surfaces: the
-/// model's diffuse term does not account for light that the facets turn away.
+/// The albedo of a white dielectric exceeds 1 near grazing directions, by up to 22 % (at roughness 0.3 and 83°; less for
+/// smoother and rougher ones): the model's diffuse term does not account for the light that tilted facets turn away.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetallicRoughness {
     base: Rgb,
@@ -87,7 +87,9 @@ impl MetallicRoughness {
         let alpha2 = self.alpha * self.alpha;
         // A Gaussian with the relative slope of the density at hand.
         let meeting = Meeting::new(disk, outgoing, |tan2| 0.25 * (alpha2 + tan2));
-        let (root, squared) = meeting.rounded(alpha2, 1.0);
+        let (root, _) = meeting.rounded(alpha2, 1.0);
+        // Far out the density changes slowly, and the ellipse's shape matters less.
+        let (_, squared) = meeting.rounded(alpha2 + meeting.tan2, 1.0);
         let density = ggx_over_disk(squared / alpha2, (root - alpha2) / alpha2) * (FRAC_1_PI / alpha2);
         // D is the density of slopes / cos⁴.
         let inv_cos2 = 1.0 + meeting.tan2;

@@ -170,8 +170,7 @@ fn albedo_stays_below_one() {
     let white = gltf(1.0, 0.0, 0.3);
     let worst =
         (0..20).map(|k| hemisphere(|i| white.eval(i, direction(1.2 + 0.018 * k as f32, 0.0))).x).fold(0.0, f32::max);
-    println!("albedo of a white dielectric near grazing: {worst}");
-    assert!(worst > 1.0 && worst < 1.4, "excess of the glTF model near grazing directions: {worst}");
+    assert!((1.2..1.23).contains(&worst), "excess of the glTF model near grazing directions: {worst}");
 }
 
 #[test]
@@ -247,9 +246,9 @@ fn widened_lobes_against_brute_force() {
     // Sender's radius by the lobe's standard deviation in the plane of reflection, and what is allowed at 0°, 40° and 63°:
     // the largest error relative to the peak, and the mean error relative to the mean.
     let allowed = [
-        (0.5, [(0.01, 0.01), (0.01, 0.01), (0.03, 0.02)]),
-        (1.5, [(0.02, 0.02), (0.05, 0.03), (0.15, 0.08)]),
-        (3.0, [(0.06, 0.06), (0.15, 0.09), (0.3, 0.15)]),
+        (0.5, [(0.01, 0.01), (0.01, 0.01), (0.03, 0.025)]),
+        (1.5, [(0.02, 0.025), (0.04, 0.03), (0.12, 0.08)]),
+        (3.0, [(0.05, 0.06), (0.15, 0.07), (0.25, 0.15)]),
     ];
     let cases: [(&dyn Reflector, f32); 6] = [
         (&ward(0.0, 1.0, 0.15), 0.21),
@@ -263,16 +262,10 @@ fn widened_lobes_against_brute_force() {
         for (ratio, allowed) in allowed {
             for (theta, allowed) in [0.0, 0.7, 1.1].into_iter().zip(allowed) {
                 let (worst, mean) = widening_error(r, theta, ratio * width);
-                println!(
-                    "{theta}, extent {ratio}: {worst:.4} {mean:.4} {}",
-                    if worst < allowed.0 && mean < allowed.1 { ' ' } else { '#' }
+                assert!(
+                    worst < allowed.0 && mean < allowed.1,
+                    "{r:?} at {theta} rad, sender of {ratio} widths: largest error {worst}, mean {mean}"
                 );
-                if false {
-                    assert!(
-                        worst < allowed.0 && mean < allowed.1,
-                        "{r:?} at {theta} rad, sender of {ratio} widths: largest error {worst}, mean {mean}"
-                    );
-                }
             }
         }
     }
