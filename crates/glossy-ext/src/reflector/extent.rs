@@ -27,7 +27,8 @@ impl Disk {
     #[inline]
     pub(super) fn new(direction: Vec3, extent: f32) -> Option<Self> {
         let z = direction.z;
-        if !(extent > 0.0) {
+        let is_point = extent <= 0.0 || extent.is_nan();
+        if is_point {
             return (z > HORIZON).then_some(Self { middle: direction, radius2: 0.0, mean_cos: z });
         }
         let extent2 = extent.min(std::f32::consts::FRAC_PI_2).powi(2);
@@ -40,7 +41,7 @@ impl Disk {
         // Seen along the height, the disk is a semicircle of half-width `reach` about z, cut at 0.
         let steep = steep2.sqrt();
         let reach = extent2.sqrt() * steep;
-        if !(z + reach > HORIZON) {
+        if z + reach <= HORIZON || reach == 0.0 {
             return None;
         }
         // A parabola through the mean height at t = 1 (1), at t = 0 (4/3π) and at t = −1 (0).
@@ -48,7 +49,7 @@ impl Disk {
         let mean = (0.4244 + t * (0.5 + t * 0.0756)).max(0.0);
         // Area of a circle's segment, with the right slopes at t = 0 and 1 (within 1 % of the circle).
         let t2 = t * t;
-        let area = (0.5 + t * (0.6366 - t2 * (0.0232 + 0.1134 * t2))).max(0.0);
+        let area = (0.5 + t * (std::f32::consts::FRAC_2_PI - t2 * (0.0232 + 0.1134 * t2))).max(0.0);
         let turn = extent2.sqrt() * (mean - t) / steep;
         let moved = direction + turn * (Vec3::Z - z * direction);
         let middle = moved / moved.length().max(f32::MIN_POSITIVE);
@@ -146,7 +147,7 @@ impl Meeting {
             let (root, solved) = slopes.solve(variance, share, middle);
             let mut step = slopes.direction_of(solved) * (-share / (root * root));
             let length2 = step.length_squared();
-            if !(length2 <= disk.radius2) {
+            if length2 > disk.radius2 {
                 step *= (disk.radius2 / length2).sqrt();
             }
             let moved = disk.middle + step;
