@@ -10,7 +10,7 @@ const DISK_POINTS: usize = 16;
 
 /// Glossy part averaged over the visible part of a disk, weighted by the cosine.
 pub(super) fn disk_average<R: Reflector + ?Sized>(r: &R, incident: Vec3, outgoing: Vec3, extent: f32) -> Rgb {
-    if !(extent > 0.0) {
+    if extent <= 0.0 || extent.is_nan() {
         return r.glossy(incident, outgoing);
     }
     let Some(axis) = unit(incident) else {

@@ -1,7 +1,7 @@
 //! The metallic-roughness model of glTF 2.0.
 
 use super::error::{ReflectorError, clamped, number, reflectance};
-use super::extent::{Slopes, ggx_over_disk, visible};
+use super::extent::{Disk, Meeting, ggx_over_disk};
 use super::half_vector::HalfRange;
 use super::ward::slope_to_width;
 use super::{Incident, Lobe, Reflector, Sample, above, cosine_hemisphere, mirrored, unit};
@@ -25,8 +25,8 @@ use std::sync::Arc;
 /// is part of [`glossy`](Reflector::glossy). It is a little positive around the back-scattering direction and negative at
 /// grazing forward scattering; its mean is 0.
 ///
-/// The albedo of a white dielectric exceeds 1 near grazing directions, by at most 8 % for smooth surfaces: the
-/// model's diffuse term does not account for light that the facets turn away.
+/// The albedo of a white dielectric exceeds 1 near grazing directions, by up to 22 % (at roughness 0.3 and 83°; less for
+/// smoother and rougher ones): the model's diffuse term does not account for the light that tilted facets turn away.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetallicRoughness {
     base: Rgb,
@@ -77,17 +77,24 @@ impl MetallicRoughness {
         }
     }
 
-    /// The lobe D G / (4 (V·N) (L·N)) averaged over a disk, and w; both directions are above the horizon.
+    /// The lobe D G / (4 (V·N) (L·N)) averaged over a disk, w for it, and w averaged over the disk.
     #[inline]
-    fn lobe_over_disk(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> (f32, f32) {
-        let slopes = Slopes::new(incident, outgoing, extent);
+    fn lobe_over_disk(&self, disk: &Disk, outgoing: Vec3) -> (f32, f32, f32) {
+        if disk.radius2 == 0.0 {
+            let (lobe, w) = self.lobe_toward(disk.middle, outgoing);
+            return (lobe, w, w);
+        }
         let alpha2 = self.alpha * self.alpha;
-        let (root, squared) = slopes.rounded(alpha2, 1.0);
+        // A Gaussian with the relative slope of the density at hand.
+        let meeting = Meeting::new(disk, outgoing, |tan2| 0.25 * (alpha2 + tan2));
+        let (root, _) = meeting.rounded(alpha2, 1.0);
+        // Far out the density changes slowly, and the ellipse's shape matters less.
+        let (_, squared) = meeting.rounded(alpha2 + meeting.tan2, 1.0);
         let density = ggx_over_disk(squared / alpha2, (root - alpha2) / alpha2) * (FRAC_1_PI / alpha2);
         // D is the density of slopes / cos⁴.
-        let inv_cos2 = 1.0 + slopes.squared;
-        let w = schlick(slopes.h);
-        (density * inv_cos2 * inv_cos2 * visibility(self.alpha, incident.z, outgoing.z), w)
+        let inv_cos2 = 1.0 + meeting.tan2;
+        let factor = meeting.weight * inv_cos2 * inv_cos2 * visibility(self.alpha, meeting.incident.z, outgoing.z);
+        (density * factor, schlick(meeting.h), schlick(disk.middle + outgoing))
     }
 
     /// The lobe and w toward a point.
@@ -99,8 +106,8 @@ impl MetallicRoughness {
 
     /// The glossy part out of the lobe and w.
     #[inline]
-    fn shade(&self, (lobe, w): (f32, f32)) -> Rgb {
-        self.f0 * (lobe * (1.0 - w)) + Rgb::splat(lobe * w) + self.remainder(w)
+    fn shade(&self, lobe: f32, w: f32, mean_w: f32) -> Rgb {
+        self.f0 * (lobe * (1.0 - w)) + Rgb::splat(lobe * w) + self.remainder(mean_w)
     }
 
     /// What the diffuse term has more than [`Reflector::diffuse`].
@@ -159,9 +166,9 @@ fn density(alpha: f32, incident: Vec3, outgoing: Vec3) -> f32 {
 
 /// Mean over outgoing directions of the lobe's albedo, without Fresnel factor and with the factor w.
 fn mean_albedo(alpha: f32) -> (f32, f32) {
-    const OUT: usize = 16;
-    const CAPS: usize = 24;
-    const TURNS: usize = 24;
+    const OUT: usize = 12;
+    const CAPS: usize = 12;
+    const TURNS: usize = 12;
     let (mut sum, mut sum_w) = (0.0_f64, 0.0_f64);
     for j in 0..OUT {
         let cos2 = (j as f32 + 0.5) / OUT as f32;
@@ -199,12 +206,20 @@ impl Reflector for MetallicRoughness {
     }
 
     fn glossy(&self, incident: Vec3, outgoing: Vec3) -> Rgb {
-        if above(incident) && above(outgoing) { self.shade(self.lobe_toward(incident, outgoing)) } else { Rgb::ZERO }
+        if above(incident) && above(outgoing) {
+            let (lobe, w) = self.lobe_toward(incident, outgoing);
+            self.shade(lobe, w, w)
+        } else {
+            Rgb::ZERO
+        }
     }
 
     fn glossy_toward_extent(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> Rgb {
-        match visible(incident, extent) {
-            Some((middle, extent)) if above(outgoing) => self.shade(self.lobe_over_disk(middle, outgoing, extent)),
+        match Disk::new(incident, extent) {
+            Some(disk) if above(outgoing) => {
+                let (lobe, w, mean_w) = self.lobe_over_disk(&disk, outgoing);
+                self.shade(lobe, w, mean_w)
+            }
             _ => Rgb::ZERO,
         }
     }
@@ -216,11 +231,11 @@ impl Reflector for MetallicRoughness {
         // Everything is linear in three numbers per sample; colours come last.
         let (mut head_on, mut grazing, mut matte) = (Rgb::ZERO, Rgb::ZERO, Rgb::ZERO);
         for sample in incident {
-            if let Some((middle, extent)) = visible(sample.direction, sample.extent) {
-                let (lobe, w) = self.lobe_over_disk(middle, outgoing, extent);
+            if let Some(disk) = Disk::new(sample.direction, sample.extent) {
+                let (lobe, w, mean_w) = self.lobe_over_disk(&disk, outgoing);
                 head_on += sample.irradiance * (lobe * (1.0 - w));
                 grazing += sample.irradiance * (lobe * w);
-                matte += sample.irradiance * (MEAN_W - w);
+                matte += sample.irradiance * (MEAN_W - mean_w);
             }
         }
         self.f0 * head_on + grazing + self.matte * (1.0 - DIELECTRIC_F0) * matte

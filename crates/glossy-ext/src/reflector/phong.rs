@@ -1,7 +1,7 @@
 //! Phong's reflection model, energy-normalised.
 
 use super::error::{ReflectorError, clamped, number, reflectance};
-use super::extent::{gaussian_over_disk, visible};
+use super::extent::{Disk, gaussian_over_disk};
 use super::half_vector::cosine_range;
 use super::{HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
 use glam::{Vec2, Vec3};
@@ -21,6 +21,8 @@ pub struct Phong {
     kd: Rgb,
     ks: Rgb,
     n: f32,
+    /// Distance from the mirror direction where the lobe is 10⁻⁷ of its peak.
+    cut: f32,
     /// Albedo of the lobe for ks = 1, mean over outgoing directions.
     unit_albedo: f32,
 }
@@ -38,7 +40,7 @@ impl Phong {
         let kd = reflectance("Phong", "kd", kd)?;
         let ks = reflectance("Phong", "ks", ks)?;
         let n = number("Phong", "n", n, (0.0, Self::MAX_EXPONENT))?;
-        Ok(Self { kd, ks, n, unit_albedo: mean_albedo(n) })
+        Ok(Self { kd, ks, n, cut: (32.0 / n.max(f32::MIN_POSITIVE)).sqrt(), unit_albedo: mean_albedo(n) })
     }
 
     /// What the lobe is multiplied by.
@@ -49,21 +51,28 @@ impl Phong {
     /// cosⁿ averaged over a disk; `mirror` is the mirrored outgoing direction, above the horizon.
     #[inline]
     fn lobe_over_disk(&self, incident: Vec3, mirror: Vec3, extent: f32) -> f32 {
-        let Some((incident, extent)) = visible(incident, extent) else {
-            return 0.0;
-        };
-        // 1 − cos ψ from the distance keeps high exponents exact.
-        let versine = 0.5 * incident.distance_squared(mirror);
-        if versine * self.n > self.n * extent * extent + CUT || versine >= 1.0 {
+        // Distances, not cosines, keep high exponents exact. cosⁿ ψ is below exp(−n ψ²/2).
+        let nearest = extent + self.cut;
+        if incident.distance_squared(mirror) > nearest * nearest {
             return 0.0;
         }
-        // cosⁿ ψ is close to exp(−n ψ²/2): a² = 2/n.
-        gaussian_over_disk(-self.n * (-versine).ln_1p(), 0.5 * self.n * extent * extent)
+        let Some(disk) = Disk::new(incident, extent) else { return 0.0 };
+        let apart = mirror - disk.middle;
+        let versine = 0.5 * apart.length_squared();
+        if versine >= 1.0 {
+            return 0.0;
+        }
+        let exponent = -self.n * (-versine).ln_1p();
+        if disk.radius2 == 0.0 {
+            return (-exponent).exp();
+        }
+        // The cosine is taken where the lobe and the disk meet: both are like Gaussians, of variances 1/n and r²/4.
+        let share = 0.25 * disk.radius2 * self.n;
+        let step = (share / (1.0 + share)).min((disk.radius2 / (2.0 * versine)).sqrt());
+        let cos = disk.middle.z + step * apart.z;
+        cos / disk.mean_cos * gaussian_over_disk(exponent, 2.0 * share)
     }
 }
-
-/// Exponent beyond which (and the square of the sender's radius) the lobe is below 10⁻⁷ of its peak.
-const CUT: f32 = 50.0;
 
 /// A direction of density (n + 1)/2π cosⁿ about the mirror direction, and its weight for ks = 1.
 fn draw(n: f32, outgoing: Vec3, u: Vec2) -> Option<(Vec3, f32)> {
@@ -79,9 +88,9 @@ fn draw(n: f32, outgoing: Vec3, u: Vec2) -> Option<(Vec3, f32)> {
 
 /// Mean weight over directions of the lobe and outgoing directions.
 fn mean_albedo(n: f32) -> f32 {
-    const OUT: usize = 16;
-    const RINGS: usize = 24;
-    const TURNS: usize = 48;
+    const OUT: usize = 12;
+    const RINGS: usize = 12;
+    const TURNS: usize = 24;
     let mut sum = 0.0_f64;
     for j in 0..OUT {
         let cos2 = (j as f32 + 0.5) / OUT as f32;

@@ -1,7 +1,7 @@
 //! Ward's reflection model with bounded albedo.
 
 use super::error::{ReflectorError, clamped, number, reflectance};
-use super::extent::{Slopes, gaussian_over_disk, visible};
+use super::extent::{Disk, Meeting, gaussian_over_disk};
 use super::half_vector::HalfRange;
 use super::{HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
 use glam::{Vec2, Vec3};
@@ -26,9 +26,8 @@ pub struct Ward {
     unit_albedo: f32,
 }
 
-/// Beyond this many α (and twice the square of the sender's reach) from the mirror direction the lobe is below 10⁻⁷ of
-/// its peak, however large the sender.
-const CUT_SQUARED: f32 = 50.0;
+/// Slopes of this many α have exp(−16) = 10⁻⁷ of the lobe's peak.
+const CUT: f32 = 4.0;
 
 impl Ward {
     /// Roughness α below which the lobe is a perfect mirror.
@@ -76,24 +75,22 @@ impl Ward {
     /// The lobe averaged over a disk, without [`scale`](Self::scale); `outgoing` is above the horizon.
     #[inline]
     fn lobe_over_disk(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> f32 {
-        let Some((incident, extent)) = visible(incident, extent) else {
-            return 0.0;
-        };
         let alpha2 = self.alpha * self.alpha;
-        // The same test as below, with a bound of the ellipse that needs no division.
+        // No direction of the disk makes a half vector with a smaller slope than this.
         let h = incident + outgoing;
-        let (across2, z2) = (h.x * h.x + h.y * h.y, h.z * h.z);
-        if across2 * z2 > 2.0 * extent * extent * (2.0 * z2 + across2) + CUT_SQUARED * alpha2 * z2 * z2 {
+        let nearest = extent + CUT * self.alpha * (h.z + extent);
+        if h.x * h.x + h.y * h.y > nearest * nearest {
             return 0.0;
         }
-        let slopes = Slopes::new(incident, outgoing, extent);
-        if slopes.squared > 2.0 * slopes.reach_squared() + CUT_SQUARED * alpha2 {
-            return 0.0;
+        let Some(disk) = Disk::new(incident, extent) else { return 0.0 };
+        if disk.radius2 == 0.0 {
+            return self.lobe_toward(incident, outgoing);
         }
+        let meeting = Meeting::new(&disk, outgoing, |_| 0.5 * alpha2);
         // A disk of radius r has the variance r²/4 per axis, the lobe α²/2.
-        let (root, squared) = slopes.rounded(alpha2, 0.5);
+        let (root, squared) = meeting.rounded(alpha2, 0.5);
         let radius2 = 2.0 * (root - alpha2).max(0.0);
-        let factor = (1.0 + slopes.squared) * slopes.inv_z * slopes.inv_z;
+        let factor = meeting.weight * (1.0 + meeting.tan2) / (meeting.h.z * meeting.h.z);
         factor * gaussian_over_disk(squared / alpha2, radius2 / alpha2)
     }
 }
@@ -101,9 +98,9 @@ impl Ward {
 /// Incident and outgoing directions of a facet: mean of 2 cos i / (cos i + cos o), the weight of a facet drawn from the
 /// Gaussian, over facets and outgoing directions.
 fn mean_albedo(alpha: f32) -> f32 {
-    const OUT: usize = 16;
-    const SLOPES: usize = 24;
-    const TURNS: usize = 24;
+    const OUT: usize = 12;
+    const SLOPES: usize = 12;
+    const TURNS: usize = 12;
     let mut sum = 0.0_f64;
     for j in 0..OUT {
         let cos2 = (j as f32 + 0.5) / OUT as f32;
