@@ -1,9 +1,10 @@
 //! A loaded scene: surfaces for the light transport, materials and textures for the eye, cameras, warnings.
 
+use crate::texture::{SurfaceAttributes, Texture};
 use crate::{Camera, SceneError, builtin, gltf_file, mgf, obj_file};
-use glam::{Mat3, Vec2};
 use glossy_ext::{Reflector, Rgb};
-use hr_diffuse::{DiffuseMaterial, Light, SceneInput, Surface};
+use glam::Vec2;
+use hr_diffuse::{DiffuseMaterial, Light, SceneInput, Surface, SurfaceReflectance};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -88,9 +89,10 @@ impl Scene {
         scene.finish()
     }
 
-    /// What the diffuse engine needs of this scene: its surfaces and lights, and of each material the Lambertian share.
+    /// What the diffuse engine needs of this scene: its surfaces and lights, of each material the Lambertian share,
+    /// and where base colours vary over surfaces their mean over any part of one.
     #[must_use]
-    pub fn input(&self) -> SceneInput {
+    pub fn input(self: &Arc<Self>) -> SceneInput {
         let diffuse = |m: &Material| DiffuseMaterial {
             reflectance: m.reflector.diffuse(),
             exitance: m.exitance,
@@ -100,7 +102,27 @@ impl Scene {
             surfaces: self.surfaces.clone(),
             materials: self.materials.iter().map(diffuse).collect(),
             lights: self.lights.clone(),
+            texture: (!self.attributes.is_empty()).then(|| Arc::clone(self) as Arc<dyn SurfaceReflectance>),
         }
+    }
+
+    /// The reflectors of all materials, in order.
+    #[must_use]
+    pub fn reflectors(&self) -> Vec<Arc<dyn Reflector>> {
+        self.materials.iter().map(|m| Arc::clone(&m.reflector)).collect()
+    }
+
+    /// Lambertian share of a surface's reflector with another base colour.
+    #[must_use]
+    pub fn diffuse_of(&self, surface: u32, base_color: Rgb) -> Rgb {
+        let reflector = &self.materials[self.surfaces[surface as usize].material as usize].reflector;
+        reflector.with_base_color(base_color).map_or_else(|| reflector.diffuse(), |r| r.diffuse())
+    }
+}
+
+impl SurfaceReflectance for Scene {
+    fn mean(&self, surface: u32, corners: &[Vec2]) -> Option<Rgb> {
+        self.mean_base_color(surface, corners).map(|color| self.diffuse_of(surface, color))
     }
 }
 
@@ -128,7 +150,7 @@ mod tests {
 
     #[test]
     fn input_has_the_lambertian_share() {
-        let scene = Scene::load("furnace").expect("built in");
+        let scene = Arc::new(Scene::load("furnace").expect("built in"));
         let input = scene.input();
         assert_eq!(input.surfaces, scene.surfaces, "all surfaces");
         let [wall] = input.materials[..] else { panic!("one material: {:?}", input.materials) };

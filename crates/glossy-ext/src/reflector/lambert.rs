@@ -14,6 +14,9 @@ pub struct Lambert {
 }
 
 impl Lambert {
+    /// Absorbs everything.
+    pub const BLACK: Self = Self { rho: Rgb::ZERO };
+
     /// From the reflectance ρ, 0…1 per channel.
     ///
     /// # Errors

@@ -1,11 +1,10 @@
 //! Putting a scene together.
 
 use crate::camera::unit;
+use crate::reflectors::ward;
 use crate::{Camera, Material, Rgb, Scene};
 use glam::{DAffine3, DVec2, DVec3};
-use glossy_ext::Reflector;
 use hr_diffuse::{Shape, Surface};
-use std::sync::Arc;
 
 /// What a material is made of.
 #[derive(Clone, Copy)]
@@ -48,51 +47,11 @@ impl Paint {
 pub(super) fn material(name: &str, paint: Paint) -> Material {
     Material {
         name: name.to_owned(),
-        reflector: reflector(paint.rd, paint.rs, paint.alpha),
+        reflector: ward(paint.rd, paint.rs, paint.alpha),
         exitance: paint.exitance,
         two_sided: paint.two_sided,
         texture: None,
         base_color: Rgb::ONE,
-    }
-}
-
-fn reflector(rd: Rgb, rs: Rgb, alpha: f32) -> Arc<dyn Reflector> {
-    Arc::new(Interim { rd, rs, alpha })
-}
-
-/// Lambert only. // replaced by Ward
-#[derive(Debug)]
-#[expect(dead_code, reason = "replaced by Ward")]
-struct Interim {
-    rd: Rgb,
-    rs: Rgb,
-    alpha: f32,
-}
-
-impl Reflector for Interim {
-    fn eval(&self, _: glam::Vec3, _: glam::Vec3) -> Rgb {
-        self.rd * std::f32::consts::FRAC_1_PI
-    }
-    fn diffuse(&self) -> Rgb {
-        self.rd
-    }
-    fn is_diffuse(&self) -> bool {
-        true
-    }
-    fn glossy_toward_extent(&self, _: glam::Vec3, _: glam::Vec3, _: f32) -> Rgb {
-        Rgb::ZERO
-    }
-    fn glossy_bound(&self, _: &hr_diffuse::Cone, _: glam::Vec3) -> f32 {
-        0.0
-    }
-    fn glossy_albedo(&self) -> Rgb {
-        Rgb::ZERO
-    }
-    fn lobe(&self, _: glam::Vec3) -> glossy_ext::Lobe {
-        glossy_ext::Lobe { direction: glam::Vec3::Z, width: std::f32::consts::FRAC_PI_2 }
-    }
-    fn sample(&self, _: glam::Vec3, _: glam::Vec2) -> Option<glossy_ext::Sample> {
-        None
     }
 }
 

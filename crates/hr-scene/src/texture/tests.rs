@@ -260,7 +260,7 @@ fn scene(shape: Shape, texture: Option<Texture>, uv: [Vec2; 4], color: [Rgb; 4])
         }],
         materials: vec![Material {
             name: String::new(),
-            reflector: crate::placeholder::phong(Rgb::ONE, Rgb::ZERO, 1.0),
+            reflector: crate::reflectors::phong(Rgb::ONE, Rgb::ZERO, 1.0),
             exitance: Rgb::ZERO,
             two_sided: false,
             texture,
