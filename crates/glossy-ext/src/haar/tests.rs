@@ -41,7 +41,7 @@ fn lobe(axis: Vec3, exponent: f32) -> impl Fn(Vec3) -> Rgb {
     move |d| Rgb::splat(d.dot(axis).max(0.0).powf(exponent))
 }
 
-/// Levels of the two sides of every edge, by walking over all pairs of leaves.
+/// The undivided triangles and their levels.
 fn leaves(haar: &Haar) -> Vec<(Triangle, u8)> {
     let mut found = Vec::new();
     haar.pieces(
@@ -639,9 +639,8 @@ proptest! {
         // And tight: no more than what the parts around the rim can add.
         let (all_low, all_high) = haar.bounds(&Cone { axis, cos_angle: (3.0 * angle + 0.02).min(PI).cos() });
         prop_assert!(low.cmpge(all_low).all() && high.cmple(all_high).all(), "a wider cone has wider bounds");
-        let wide = make(&lobes, &settings(1, 4, 0.3)).bounds(&Cone::single(axis));
         let slack = (all_high - all_low) + 1e-3;
-        prop_assert!((wide.1 - wide.0).is_finite() && (high - most).cmple(slack).all(), "loose above");
+        prop_assert!((high - most).cmple(slack).all(), "loose above");
         prop_assert!((least - low).cmple(slack).all(), "loose below");
     }
 
