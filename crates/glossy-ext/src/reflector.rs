@@ -3,8 +3,8 @@
 //! Directions are unit vectors in the surface's own frame: z along the normal, both pointing away from the
 //! surface, both with z > 0 (engines turn the frame over for the back of a two-sided surface).
 
-use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
+use glam::{Vec2, Vec3};
 use std::fmt::Debug;
 use std::sync::Arc;
 

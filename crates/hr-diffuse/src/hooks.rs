@@ -51,10 +51,7 @@ pub trait Hierarchy: Sync {
     fn direction_to(&self, sender: NodeId, at: Vec3) -> (Vec3, f32) {
         let to = self.center(sender) - at;
         let distance = to.length().max(f32::MIN_POSITIVE);
-        (
-            to / distance,
-            (self.radius(sender) / distance).min(1.0).asin(),
-        )
+        (to / distance, (self.radius(sender) / distance).min(1.0).asin())
     }
 }
 
@@ -97,13 +94,7 @@ pub trait LightField: Sync {
     );
     /// Averages the children's exitant light, weighted by area. `children` are the states of
     /// `hierarchy.children(parent)`, in order.
-    fn pull<H: Hierarchy>(
-        &self,
-        hierarchy: &H,
-        parent: NodeId,
-        state: &mut Self::State,
-        children: &[Self::State],
-    );
+    fn pull<H: Hierarchy>(&self, hierarchy: &H, parent: NodeId, state: &mut Self::State, children: &[Self::State]);
     /// Exitant radiance (W/(m² sr)) in a direction away from the node, without the diffuse part. For nodes that
     /// are not flat: radiant intensity per unit of [`Hierarchy::area`].
     fn radiance(&self, state: &Self::State, away: Vec3) -> Rgb;
