@@ -256,3 +256,19 @@ fn hits_locate_the_part() {
         assert_eq!(surface.locate(&children, hit.uv), i, "part {i} at {}", hit.uv);
     }
 }
+
+#[test]
+fn walls_do_not_leak_from_afar() {
+    // From afar the boxes' near and far distances differ by little more than their rounding.
+    let visibility = scene(wall(24, 0.3, |a, b| dvec3(0.5, a, b)));
+    for i in 0..4000u32 {
+        let share = |k: u32| (i.wrapping_mul(k) % 4001) as f32 / 4001.0;
+        let target = vec3(0.5, 0.01 + 0.98 * share(577), 0.01 + 0.98 * share(1423));
+        for distance in [3.0, 40.0, 500.0] {
+            let eye = vec3(0.5, 0.5, 0.5) + vec3(1.0, share(31) - 0.5, 0.5 - share(97)) * distance;
+            let hit = visibility.closest(eye, target - eye, 0.0, 2.0);
+            assert!(hit.is_some(), "from {eye} at {target}");
+            assert!(blocked(&visibility, eye, 2.0 * target - eye), "from {eye} through {target}");
+        }
+    }
+}
