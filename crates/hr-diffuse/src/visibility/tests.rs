@@ -73,7 +73,8 @@ proptest! {
     fn short_and_long_segments_meet_a_wall_between_them(
         length in -4.0f32..0.5, share in 0.1f32..0.9, tilt in -1f32..1.0,
     ) {
-        let wall = scene([Shape::Quad([dvec3(0.5, 0.0, 0.0), dvec3(0.5, 1.0, 0.0), dvec3(0.5, 1.0, 1.0), dvec3(0.5, 0.0, 1.0)])]);
+        let wall = [dvec3(0.5, 0.0, 0.0), dvec3(0.5, 1.0, 0.0), dvec3(0.5, 1.0, 1.0), dvec3(0.5, 0.0, 1.0)];
+        let wall = scene([Shape::Quad(wall)]);
         let step = vec3(1.0, tilt, 0.2).normalize() * 10f32.powf(length) * 0.3;
         let middle = vec3(0.5, 0.5, 0.5);
         prop_assert!(blocked(&wall, middle - step * share, middle + step * (1.0 - share)), "step {step}");
