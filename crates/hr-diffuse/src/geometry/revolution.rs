@@ -13,8 +13,8 @@ use std::f32::consts::TAU;
 /// What rounding may do to the cosine between a normal computed in f32 and the axis of a cone.
 const COSINE_SLACK: f32 = 1e-6;
 
-/// Hits this far (unit space, along the profile) beyond the end of a profile still count, so that no ray slips through where two
-/// surfaces abut: the rounding of positions to f32.
+/// Hits this far (unit space, along the profile) beyond the end of a profile still count, so that no ray slips
+/// through where two surfaces abut: the rounding of positions to f32.
 const RIM: f64 = 2e-7;
 
 /// A profile curve (ρ, h), v running 0…1: distance from the axis and height along it, in unit space.
