@@ -7,17 +7,10 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 use std::sync::Arc;
 
 /// glTF's metallic-roughness material.
-pub(crate) fn metallic_roughness(
-    base_color: Rgb,
-    metallic: f32,
-    roughness: f32,
-) -> Arc<dyn Reflector> {
+pub(crate) fn metallic_roughness(base_color: Rgb, metallic: f32, roughness: f32) -> Arc<dyn Reflector> {
     // replaced by MetallicRoughness
     let _ = roughness;
-    Arc::new(Lambert {
-        base_color,
-        scale: 1.0 - metallic,
-    })
+    Arc::new(Lambert { base_color, scale: 1.0 - metallic })
 }
 
 /// Lambert and energy-normalised Phong.
@@ -25,10 +18,7 @@ pub(crate) fn phong(diffuse: Rgb, specular: Rgb, exponent: f32) -> Arc<dyn Refle
     // replaced by Phong
     let _ = exponent;
     let _ = specular;
-    Arc::new(Lambert {
-        base_color: diffuse,
-        scale: 1.0,
-    })
+    Arc::new(Lambert { base_color: diffuse, scale: 1.0 })
 }
 
 #[derive(Debug)]
@@ -57,18 +47,12 @@ impl Reflector for Lambert {
         Rgb::ZERO
     }
     fn lobe(&self, _outgoing: Vec3) -> Lobe {
-        Lobe {
-            direction: Vec3::Z,
-            width: FRAC_PI_2,
-        }
+        Lobe { direction: Vec3::Z, width: FRAC_PI_2 }
     }
     fn sample(&self, _outgoing: Vec3, _u: Vec2) -> Option<Sample> {
         None
     }
     fn with_base_color(&self, color: Rgb) -> Option<Arc<dyn Reflector>> {
-        Some(Arc::new(Self {
-            base_color: color,
-            scale: self.scale,
-        }))
+        Some(Arc::new(Self { base_color: color, scale: self.scale }))
     }
 }
