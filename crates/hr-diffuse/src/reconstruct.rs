@@ -288,7 +288,7 @@ fn gather_at<L: LightField>(
         if renew && visibility >= 0.0 && share > if partial { PARTIAL_SHARE } else { WHOLE_SHARE } {
             let count = (share * RAYS).clamp(1.0, MOST_RAYS) as u32;
             rays += count;
-            visibility = visibility_at(light.scene, light.elements, (x, n, element.source), sender, count, seed);
+            visibility = visibility_at(light, (x, n, element.source), sender, count, seed);
         }
         sum += irradiance * visibility.abs();
     }

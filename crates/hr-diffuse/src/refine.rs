@@ -28,6 +28,7 @@ const RADIOSITY_SHARE: f32 = 0.5;
 const FIRST_SEGMENTS: u32 = 4;
 const MOST_SEGMENTS: u32 = 32;
 
+static EX: std::sync::LazyLock<f32> = std::sync::LazyLock::new(|| std::env::var("EX").map_or(0.5, |v| v.parse().unwrap()));
 /// A link to be, between two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Pair {
@@ -241,7 +242,7 @@ fn decide<L: LightField>(
     }
     let Some(bounds) = factor_bounds(light.scene, r, s) else { return Verdict::Facing };
     let interval = interval(light, pair.sender, &bounds);
-    let weight = r.importance * (r.area / tolerance.area).sqrt();
+    let weight = r.importance * (r.area / tolerance.area).powf(*EX);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * (GEOMETRY_SHARE * interval.geometry + RADIOSITY_SHARE * interval.radiosity);
     if by_bounds > tolerance.error {
@@ -269,20 +270,14 @@ fn decide<L: LightField>(
     let start = Instant::now();
     let mut blocker = u32::MAX;
     let (mut seen, mut total, mut rays) =
-        segments::visibility(light.scene, light.elements, pair.receiver, pair.sender, 0..FIRST_SEGMENTS, &mut blocker);
+        segments::visibility(light, pair.receiver, pair.sender, 0..FIRST_SEGMENTS, &mut blocker);
     let worth = (FIRST_SEGMENTS as f32 * stake / tolerance.error) as u32;
     let partial = seen > 0.0 && seen < total;
     if !(partial && stake > tolerance.error && !stopped) {
         let more = worth.clamp(FIRST_SEGMENTS, MOST_SEGMENTS);
         if more > FIRST_SEGMENTS {
-            let (a, b, c) = segments::visibility(
-                light.scene,
-                light.elements,
-                pair.receiver,
-                pair.sender,
-                FIRST_SEGMENTS..more,
-                &mut blocker,
-            );
+            let (a, b, c) =
+                segments::visibility(light, pair.receiver, pair.sender, FIRST_SEGMENTS..more, &mut blocker);
             seen += a;
             total += b;
             rays += c;
@@ -311,7 +306,7 @@ fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Toleranc
     }
     // The inside of a curved surface: split while the light that would be lost matters.
     let (_, high) = light.emitted_bounds(node, &crate::Cone::SPHERE);
-    let weight = element.importance * (element.area / tolerance.area).sqrt();
+    let weight = element.importance * (element.area / tolerance.area).powf(*EX);
     let at_stake = high.max_element() * weight;
     let splittable = element.is_patch() && element.radius > tolerance.smallest;
     if at_stake > tolerance.error && splittable && !stopped { Verdict::SplitBoth } else { Verdict::Facing }

@@ -2,6 +2,8 @@
 
 use crate::LightKind;
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
+use crate::hooks::LightField;
+use crate::transport::Light;
 use crate::sampling::{hash, point2, point4, unit};
 use glam::{Vec2, Vec3};
 
@@ -13,8 +15,16 @@ struct Point {
     surface: u32,
 }
 
-/// Draws a point below a node: down the tree in proportion to area, then uniformly on the surface.
-fn draw(scene: &SceneData, elements: &Elements, mut node: u32, mut choice: f32, u: Vec2) -> Option<Point> {
+/// Draws a point below a node: down the tree in proportion to each child's area times `density`, then uniformly on
+/// the surface.
+fn draw(
+    scene: &SceneData,
+    elements: &Elements,
+    mut node: u32,
+    mut choice: f32,
+    u: Vec2,
+    density: impl Fn(usize) -> f32,
+) -> Option<Point> {
     loop {
         let element = &elements.nodes[node as usize];
         match element.kind {
@@ -26,17 +36,19 @@ fn draw(scene: &SceneData, elements: &Elements, mut node: u32, mut choice: f32, 
                 return Some(Point { at, normal, surface: element.source });
             }
             Kind::Cluster => {
-                let total = element.area;
+                let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
+                let weight = |child: usize| elements.nodes[child].area * density(child);
+                let total: f32 = children.clone().map(weight).sum();
                 let mut rest = choice * total;
                 let mut chosen = None;
-                for child in element.first_child..element.first_child + element.child_count {
-                    let area = elements.nodes[child as usize].area;
-                    if area > 0.0 {
-                        chosen = Some((child, (rest / area).clamp(0.0, 0.999_999)));
-                        if rest < area {
+                for child in children {
+                    let weight = weight(child);
+                    if weight > 0.0 {
+                        chosen = Some((child as u32, (rest / weight).clamp(0.0, 0.999_999)));
+                        if rest < weight {
                             break;
                         }
-                        rest -= area;
+                        rest -= weight;
                     }
                 }
                 (node, choice) = chosen?;
@@ -48,28 +60,29 @@ fn draw(scene: &SceneData, elements: &Elements, mut node: u32, mut choice: f32, 
 /// Visibility estimated by `count` segments: the share, weighted by the transfer's kernel, that is not blocked,
 /// and the number of rays shot. `None` where no drawn pair faced each other.
 #[must_use]
-pub(crate) fn visibility(
-    scene: &SceneData,
-    elements: &Elements,
+pub(crate) fn visibility<L: LightField>(
+    Light { scene, elements, exitant, .. }: Light<'_, L>,
     receiver: u32,
     sender: u32,
     range: std::ops::Range<u32>,
     blocker: &mut u32,
 ) -> (f32, f32, u32) {
+    // Points of a sender are drawn by their power: what a lamp among walls sends is not seen where the walls are.
+    let power = |child: usize| exitant.radiosity[child].element_sum() + f32::MIN_POSITIVE;
     let seed = hash(receiver, sender);
     let (mut seen, mut total, mut rays) = (0.0, 0.0, 0);
     let source = &elements.nodes[sender as usize];
     for i in range {
         let u = point4(seed, i);
         let choices = [unit(hash(seed ^ 0x5bd1, i)), unit(hash(seed ^ 0x1b87, i))];
-        let Some(r) = draw(scene, elements, receiver, choices[0], Vec2::new(u.x, u.y)) else { continue };
+        let Some(r) = draw(scene, elements, receiver, choices[0], Vec2::new(u.x, u.y), |_| 1.0) else { continue };
         let (target, weight, surface) = match source.kind {
             Kind::Light => {
                 let (to, cosine) = light_segment(scene, source, r.at, r.normal);
                 (to, cosine, u32::MAX)
             }
             _ => {
-                let Some(s) = draw(scene, elements, sender, choices[1], Vec2::new(u.z, u.w)) else { continue };
+                let Some(s) = draw(scene, elements, sender, choices[1], Vec2::new(u.z, u.w), power) else { continue };
                 let to = s.at - r.at;
                 let d2 = to.length_squared();
                 let (a, b) = (to.dot(r.normal), -to.dot(s.normal));
@@ -99,9 +112,8 @@ fn light_segment(scene: &SceneData, source: &Element, x: Vec3, n: Vec3) -> (Vec3
 
 /// Share of a sender that a point with normal `n` on a surface sees, from `count` segments; 0 where none faces it.
 #[must_use]
-pub(crate) fn visibility_at(
-    scene: &SceneData,
-    elements: &Elements,
+pub(crate) fn visibility_at<L: LightField>(
+    Light { scene, elements, exitant, .. }: Light<'_, L>,
     (x, n, surface): (Vec3, Vec3, u32),
     sender: u32,
     count: u32,
@@ -114,11 +126,12 @@ pub(crate) fn visibility_at(
         let free = cosine > 0.0 && !scene.visibility.occluded(x, to, [surface, u32::MAX], &mut blocker);
         return if free { 1.0 } else { 0.0 };
     }
+    let power = |child: usize| exitant.radiosity[child].element_sum() + f32::MIN_POSITIVE;
     let seed = hash(seed, sender);
     let (mut seen, mut total) = (0.0, 0.0);
     for i in 0..count {
         let choice = unit(hash(seed ^ 0x68e3, i));
-        let Some(s) = draw(scene, elements, sender, choice, point2(seed, i)) else { continue };
+        let Some(s) = draw(scene, elements, sender, choice, point2(seed, i), power) else { continue };
         let to = s.at - x;
         let d2 = to.length_squared();
         let (a, b) = (to.dot(n), -to.dot(s.normal));

@@ -173,7 +173,7 @@ impl<L: LightField> Solver<L> {
     ) -> bool {
         let start = Instant::now();
         let tolerance = Tolerance {
-            error: LINK_SHARE * self.settings.error * looseness * self.mean_irradiance(),
+            error: std::env::var("LS").map_or(LINK_SHARE, |v| v.parse().unwrap()) * self.settings.error * looseness * self.mean_irradiance(),
             area: self.area,
             smallest: SMALLEST_SHARE * self.settings.error.sqrt(),
         };

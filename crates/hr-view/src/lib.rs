@@ -1,1 +1,3 @@
-//! (in the making)
+//! Walk through a glossy global illumination solution.
+pub mod raycast;
+pub mod solved;
