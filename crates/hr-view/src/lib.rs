@@ -1,1 +1,4 @@
-//! (in the making)
+//! Walk through a glossy global illumination solution: a window, a command line, frames.
+
+pub mod display;
+pub mod window;
