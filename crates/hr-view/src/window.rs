@@ -21,7 +21,7 @@ pub use tone::{Curve, Tone};
 use crate::display::{MeshError, Walkable};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
-use winit::event_loop::{EventLoop, OwnedDisplayHandle};
+use winit::event_loop::EventLoop;
 
 /// How the window opens.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +34,10 @@ pub struct WindowOptions {
 
 impl Default for WindowOptions {
     fn default() -> Self {
-        Self { size: [1280, 800], tolerance: 0.0 }
+        Self {
+            size: [1280, 800],
+            tolerance: 0.0,
+        }
     }
 }
 
@@ -43,16 +46,24 @@ impl Default for WindowOptions {
 #[non_exhaustive]
 pub enum WindowError {
     /// There is no screen to open a window on. Draw frames instead.
-    #[error("no window can be opened here ({0}); run in a graphical session, or use --frames or --image")]
+    #[error(
+        "no window can be opened here ({0}); run in a graphical session, or use --frames or --image"
+    )]
     NoDisplay(String),
     /// There is no graphics device. Draw frames instead.
-    #[error("no graphics device for the window ({0}); install a Vulkan or OpenGL driver, or use --frames or --image")]
+    #[error(
+        "no graphics device for the window ({0}); install a Vulkan or OpenGL driver, or use --frames or --image"
+    )]
     NoAdapter(String),
     /// The graphics device failed.
-    #[error("the graphics device failed: {0}; close other programs that use it, or use --frames or --image")]
+    #[error(
+        "the graphics device failed: {0}; close other programs that use it, or use --frames or --image"
+    )]
     Device(String),
     /// Mesh or picture do not fit the graphics device.
-    #[error("the graphics device holds at most {limit} of {size} bytes or pixels; ask for a coarser solution or less")]
+    #[error(
+        "the graphics device holds at most {limit} of {size} bytes or pixels; ask for a coarser solution or less"
+    )]
     TooLarge {
         /// What is needed.
         size: u64,
@@ -80,7 +91,7 @@ pub enum WindowError {
 pub fn open(walk: &dyn Walkable, options: &WindowOptions) -> Result<(), WindowError> {
     walk.mesh().check()?;
     let event_loop = event_loop()?;
-    let mut app = app::App::new(walk, *options, instance(Some(event_loop.owned_display_handle())));
+    let mut app = app::App::new(walk, *options);
     let ended = event_loop.run_app(&mut app);
     app.finish()?;
     ended.map_err(|error| WindowError::NoDisplay(reason(&error)))
@@ -99,7 +110,10 @@ fn event_loop() -> Result<EventLoop<()>, WindowError> {
         Err(panic) => {
             let text = panic.downcast_ref::<String>().map(String::as_str);
             let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-            Err(WindowError::NoDisplay(text.unwrap_or("the window system could not be reached").replace('\n', " ")))
+            Err(WindowError::NoDisplay(
+                text.unwrap_or("the window system could not be reached")
+                    .replace('\n', " "),
+            ))
         }
     }
 }
@@ -107,15 +121,11 @@ fn event_loop() -> Result<EventLoop<()>, WindowError> {
 /// What the window system says, without the place in winit's source that it begins with.
 fn reason(error: &dyn std::error::Error) -> String {
     let text = gpu::one_line(error);
-    let after = text.split_once(".rs:").map(|(_, rest)| rest.trim_start_matches(|c: char| c.is_ascii_digit()));
-    after.map_or(text.as_str(), |rest| rest.trim_start_matches(": ")).trim_end_matches('.').to_owned()
-}
-
-/// The graphics system; `WGPU_BACKEND` and the like choose among several.
-fn instance(display: Option<OwnedDisplayHandle>) -> wgpu::Instance {
-    let descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-    wgpu::Instance::new(match display {
-        Some(display) => descriptor.with_display_handle(Box::new(display)),
-        None => descriptor,
-    })
+    let after = text
+        .split_once(".rs:")
+        .map(|(_, rest)| rest.trim_start_matches(|c: char| c.is_ascii_digit()));
+    after
+        .map_or(text.as_str(), |rest| rest.trim_start_matches(": "))
+        .trim_end_matches('.')
+        .to_owned()
 }

@@ -1,6 +1,6 @@
 //! Events in, frames out.
 
-use super::gpu::{Gpu, one_line};
+use super::gpu::Gpu;
 use super::hud::{Facts, Hud, Settings};
 use super::lists::{VertexList, split};
 use super::refresh::{Refresh, Refreshed};
@@ -16,7 +16,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
 use winit::dpi::{LogicalSize, PhysicalPosition};
-use winit::event::{DeviceEvent, DeviceId, ElementState, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event::{
+    DeviceEvent, DeviceId, ElementState, MouseButton, MouseScrollDelta, WindowEvent,
+};
 use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::keyboard::{Key, KeyCode, NamedKey, PhysicalKey};
 use winit::window::{CursorGrabMode, Window, WindowId};
@@ -48,14 +50,18 @@ const CAMERA_KEYS: [KeyCode; 10] = [
 pub(super) struct App<'a> {
     walk: &'a dyn Walkable,
     options: WindowOptions,
-    instance: wgpu::Instance,
     live: Option<Live<'a>>,
     failure: Option<WindowError>,
 }
 
 impl<'a> App<'a> {
-    pub(super) fn new(walk: &'a dyn Walkable, options: WindowOptions, instance: wgpu::Instance) -> Self {
-        Self { walk, options, instance, live: None, failure: None }
+    pub(super) fn new(walk: &'a dyn Walkable, options: WindowOptions) -> Self {
+        Self {
+            walk,
+            options,
+            live: None,
+            failure: None,
+        }
     }
 
     /// The error that ended the walk, if any.
@@ -64,7 +70,11 @@ impl<'a> App<'a> {
     }
 
     /// Runs a step of the open window; ends the walk where it fails.
-    fn step(&mut self, event_loop: &ActiveEventLoop, step: impl FnOnce(&mut Live<'a>) -> Result<Next, WindowError>) {
+    fn step(
+        &mut self,
+        event_loop: &ActiveEventLoop,
+        step: impl FnOnce(&mut Live<'a>) -> Result<Next, WindowError>,
+    ) {
         let Some(live) = &mut self.live else { return };
         match step(live) {
             Ok(Next::Go) => {}
@@ -82,7 +92,7 @@ impl ApplicationHandler for App<'_> {
         if self.live.is_some() {
             return;
         }
-        match Live::new(self.walk, self.options, &self.instance, event_loop) {
+        match Live::new(self.walk, self.options, event_loop) {
             Ok(live) => self.live = Some(live),
             Err(error) => {
                 self.failure.get_or_insert(error);
@@ -92,8 +102,7 @@ impl ApplicationHandler for App<'_> {
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
-        let instance = self.instance.clone();
-        self.step(event_loop, |live| live.window_event(&instance, &event));
+        self.step(event_loop, |live| live.window_event(&event));
     }
 
     fn device_event(&mut self, event_loop: &ActiveEventLoop, _: DeviceId, event: DeviceEvent) {
@@ -138,8 +147,8 @@ enum Next {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mouse {
     Free,
-    /// The left button is down; the last position in pixels, once it is known.
-    Dragging(Option<PhysicalPosition<f64>>),
+    /// The left button is down.
+    Dragging,
     Captured,
 }
 
@@ -164,6 +173,8 @@ struct Live<'a> {
     walker: Walker,
     camera: Option<usize>,
     mouse: Mouse,
+    /// Where the cursor was last, in pixels.
+    cursor: Option<PhysicalPosition<f64>>,
     /// When the last frame began, while something moves.
     last_frame: Option<Instant>,
     frame_time: Duration,
@@ -176,7 +187,6 @@ impl<'a> Live<'a> {
     fn new(
         walk: &'a dyn Walkable,
         options: WindowOptions,
-        instance: &wgpu::Instance,
         event_loop: &ActiveEventLoop,
     ) -> Result<Self, WindowError> {
         let [width, height] = options.size.map(|side| side.clamp(64, 16_384));
@@ -185,10 +195,11 @@ impl<'a> Live<'a> {
             .with_inner_size(LogicalSize::new(width, height))
             // Shown when there is something to show: failing leaves no flash of a window behind.
             .with_visible(false);
-        let window = event_loop.create_window(attributes).map_err(|e| WindowError::NoDisplay(reason(&e)))?;
+        let window = event_loop
+            .create_window(attributes)
+            .map_err(|e| WindowError::NoDisplay(reason(&e)))?;
         let window = Arc::new(window);
-        let surface = new_surface(instance, &window)?;
-        let gpu = Gpu::new(instance, Some(&surface))?;
+        let (gpu, surface) = Gpu::with_surface(&window, &event_loop.owned_display_handle())?;
         let config = configuration(&gpu, &surface, &window)?;
         let mesh = walk.mesh();
         let lists = split(mesh);
@@ -197,7 +208,11 @@ impl<'a> Live<'a> {
         gpu.fault()?;
         let info = gpu.adapter.get_info();
         let walker = Walker::new(walk);
-        let tolerance = if options.tolerance.is_finite() { options.tolerance.to_degrees().max(0.0) } else { 0.0 };
+        let tolerance = if options.tolerance.is_finite() {
+            options.tolerance.to_degrees().max(0.0)
+        } else {
+            0.0
+        };
         let live = Self {
             walk,
             refresh: Refresh::new(walk, &lists[1]),
@@ -205,15 +220,25 @@ impl<'a> Live<'a> {
             evaluation: Duration::ZERO,
             computed_for: None,
             hud: Hud::new(&gpu, &window, config.format),
-            settings: Settings { stops: 0.0, tolerance, fov_x: walker.view.fov_x },
+            settings: Settings {
+                stops: 0.0,
+                tolerance,
+                fov_x: walker.view.fov_x,
+            },
             automatic: Tone::for_mesh(mesh),
             camera: (!walk.cameras().is_empty()).then_some(0),
             walker,
             mouse: Mouse::Free,
+            cursor: None,
             last_frame: None,
             frame_time: Duration::ZERO,
             again: None,
-            device: format!("{} ({:?}), {} samples a pixel", info.name, info.backend, pass.samples()),
+            device: format!(
+                "{} ({:?}), {} samples a pixel",
+                info.name,
+                info.backend,
+                pass.samples()
+            ),
             window,
             surface,
             gpu,
@@ -228,41 +253,54 @@ impl<'a> Live<'a> {
         Ok(live)
     }
 
-    fn window_event(&mut self, instance: &wgpu::Instance, event: &WindowEvent) -> Result<Next, WindowError> {
+    fn window_event(&mut self, event: &WindowEvent) -> Result<Next, WindowError> {
         let (taken, looks_different) = self.hud.event(&self.window, event);
         if looks_different && !matches!(event, WindowEvent::RedrawRequested) {
             self.window.request_redraw();
         }
         match event {
             WindowEvent::CloseRequested => return Ok(Next::Quit),
-            WindowEvent::RedrawRequested => self.redraw(instance)?,
+            WindowEvent::RedrawRequested => self.redraw()?,
             WindowEvent::Resized(size) => {
                 let limit = self.gpu.device.limits().max_texture_dimension_2d;
-                (self.config.width, self.config.height) = (size.width.min(limit), size.height.min(limit));
+                (self.config.width, self.config.height) =
+                    (size.width.min(limit), size.height.min(limit));
                 self.configure();
                 self.window.request_redraw();
             }
-            WindowEvent::ScaleFactorChanged { .. } | WindowEvent::Occluded(false) => self.window.request_redraw(),
+            WindowEvent::ScaleFactorChanged { .. } | WindowEvent::Occluded(false) => {
+                self.window.request_redraw()
+            }
             WindowEvent::Focused(false) => {
                 self.walker.release();
                 self.set_mouse(Mouse::Free);
             }
-            WindowEvent::KeyboardInput { event, is_synthetic: false, .. } if !taken || !event.state.is_pressed() => {
-                let PhysicalKey::Code(code) = event.physical_key else { return Ok(Next::Go) };
+            WindowEvent::KeyboardInput {
+                event,
+                is_synthetic: false,
+                ..
+            } if !taken || !event.state.is_pressed() => {
+                let PhysicalKey::Code(code) = event.physical_key else {
+                    return Ok(Next::Go);
+                };
                 if self.walker.key(code, event.state.is_pressed()) {
                     self.window.request_redraw();
                 } else if event.state.is_pressed() {
                     return self.command(code, &event.logical_key, event.repeat);
                 }
             }
-            WindowEvent::MouseInput { state, button, .. } => self.mouse_button(*state, *button, taken),
+            WindowEvent::MouseInput { state, button, .. } => {
+                self.mouse_button(*state, *button, taken)
+            }
             WindowEvent::CursorMoved { position, .. } => self.drag(*position),
+            WindowEvent::CursorLeft { .. } if self.mouse != Mouse::Dragging => self.cursor = None,
             WindowEvent::MouseWheel { delta, .. } if !taken => {
                 self.walker.change_speed(match delta {
                     MouseScrollDelta::LineDelta(_, y) => f64::from(*y),
                     MouseScrollDelta::PixelDelta(p) => p.y / NOTCH,
                 });
-                self.hud.say(format!("walking speed {:.3} units/s", self.walker.speed()));
+                self.hud
+                    .say(format!("walking speed {:.3} units/s", self.walker.speed()));
                 self.window.request_redraw();
             }
             _ => {}
@@ -303,7 +341,8 @@ impl<'a> Live<'a> {
             }
             None => {
                 let count = self.walk.cameras().len();
-                self.hud.say(format!("no camera {}; the scene has {count}", index + 1));
+                self.hud
+                    .say(format!("no camera {}; the scene has {count}", index + 1));
             }
         }
     }
@@ -311,9 +350,9 @@ impl<'a> Live<'a> {
     fn mouse_button(&mut self, state: ElementState, button: MouseButton, taken: bool) {
         match (button, state) {
             (MouseButton::Left, ElementState::Pressed) if !taken && self.mouse == Mouse::Free => {
-                self.mouse = Mouse::Dragging(None);
+                self.mouse = Mouse::Dragging;
             }
-            (MouseButton::Left, ElementState::Released) if matches!(self.mouse, Mouse::Dragging(_)) => {
+            (MouseButton::Left, ElementState::Released) if self.mouse == Mouse::Dragging => {
                 self.mouse = Mouse::Free;
             }
             (MouseButton::Right, ElementState::Pressed) if !taken => self.toggle_capture(),
@@ -323,17 +362,21 @@ impl<'a> Live<'a> {
 
     /// A drag across the whole picture turns by the whole field of view, like turning one's head that far.
     fn drag(&mut self, position: PhysicalPosition<f64>) {
-        let Mouse::Dragging(last) = self.mouse else { return };
-        self.mouse = Mouse::Dragging(Some(position));
-        if let Some(last) = last {
+        let last = self.cursor.replace(position);
+        if let (Mouse::Dragging, Some(last)) = (self.mouse, last) {
             let turn = self.walker.view.fov_x.to_radians() / f64::from(self.config.width.max(1));
-            self.walker.turn((position.x - last.x) * turn, (last.y - position.y) * turn);
+            self.walker
+                .turn((position.x - last.x) * turn, (last.y - position.y) * turn);
             self.window.request_redraw();
         }
     }
 
     fn toggle_capture(&mut self) {
-        let wanted = if self.mouse == Mouse::Captured { Mouse::Free } else { Mouse::Captured };
+        let wanted = if self.mouse == Mouse::Captured {
+            Mouse::Free
+        } else {
+            Mouse::Captured
+        };
         self.set_mouse(wanted);
     }
 
@@ -341,8 +384,13 @@ impl<'a> Live<'a> {
         if wanted == Mouse::Captured {
             // X11 can only confine, Wayland and macOS only lock.
             let grab = self.window.set_cursor_grab(CursorGrabMode::Locked);
-            if let Err(error) = grab.or_else(|_| self.window.set_cursor_grab(CursorGrabMode::Confined)) {
-                self.hud.say(format!("the mouse cannot be captured here ({}); drag instead", reason(&error)));
+            if let Err(error) =
+                grab.or_else(|_| self.window.set_cursor_grab(CursorGrabMode::Confined))
+            {
+                self.hud.say(format!(
+                    "the mouse cannot be captured here ({}); drag instead",
+                    reason(&error)
+                ));
                 self.window.request_redraw();
                 return;
             }
@@ -356,7 +404,10 @@ impl<'a> Live<'a> {
     }
 
     fn tone(&self) -> Tone {
-        Tone { exposure: self.automatic.exposure * self.settings.stops.exp2(), ..self.automatic }
+        Tone {
+            exposure: self.automatic.exposure * self.settings.stops.exp2(),
+            ..self.automatic
+        }
     }
 
     /// Applies the configuration, unless the window is minimised.
@@ -366,7 +417,7 @@ impl<'a> Live<'a> {
         }
     }
 
-    fn redraw(&mut self, instance: &wgpu::Instance) -> Result<(), WindowError> {
+    fn redraw(&mut self) -> Result<(), WindowError> {
         let size = [self.config.width, self.config.height];
         if size.contains(&0) {
             self.last_frame = None;
@@ -378,14 +429,24 @@ impl<'a> Live<'a> {
             self.frame_time = begin - last;
         } else {
             // The first frame of a movement has no predecessor to measure from; a step makes the key feel at once.
-            self.walker.advance(Duration::from_millis(if self.walker.is_moving() { 10 } else { 0 }));
+            self.walker
+                .advance(Duration::from_millis(if self.walker.is_moving() {
+                    10
+                } else {
+                    0
+                }));
         }
         self.walker.view.fov_x = self.settings.fov_x;
         self.refresh_glossy(size);
-        let Some(output) = self.next_output(instance)? else { return Ok(()) };
+        let Some(output) = self.next_output()? else {
+            return Ok(());
+        };
         let facts = Facts {
             scene: self.walk.name(),
-            camera: self.camera.and_then(|i| self.walk.cameras().get(i)).map(|(name, _)| name.as_str()),
+            camera: self
+                .camera
+                .and_then(|i| self.walk.cameras().get(i))
+                .map(|(name, _)| name.as_str()),
             triangles: self.walk.mesh().triangle_count(),
             vertices: self.walk.mesh().positions.len(),
             glossy: self.walk.mesh().glossy.len(),
@@ -397,11 +458,22 @@ impl<'a> Live<'a> {
         let before = self.settings;
         let layout = self.hud.layout(&self.window, &facts, &mut self.settings);
         self.again = layout.again;
-        let target = output.texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let frame = Frame { view: &self.walker.view, tone: &self.tone(), mesh: self.walk.mesh() };
-        self.pass.draw(&self.gpu, &self.scene, &mut encoder, &target, size, &frame);
-        self.hud.draw(&self.gpu, &mut encoder, &target, size, layout);
+        let target = output
+            .texture
+            .create_view(&wgpu::TextureViewDescriptor::default());
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let frame = Frame {
+            view: &self.walker.view,
+            tone: &self.tone(),
+            mesh: self.walk.mesh(),
+        };
+        self.pass
+            .draw(&self.gpu, &self.scene, &mut encoder, &target, size, &frame);
+        self.hud
+            .draw(&self.gpu, &mut encoder, &target, size, layout);
         self.gpu.queue.submit([encoder.finish()]);
         self.window.pre_present_notify();
         self.gpu.queue.present(output);
@@ -427,9 +499,14 @@ impl<'a> Live<'a> {
         self.computed_for = Some(wanted);
         let begin = Instant::now();
         let view = &self.walker.view;
-        let sight = view.sight(self.walk.mesh().origin, f64::from(size[0]) / f64::from(size[1]));
+        let sight = view.sight(
+            self.walk.mesh().origin,
+            f64::from(size[0]) / f64::from(size[1]),
+        );
         let tolerance = self.settings.tolerance.to_radians();
-        self.refreshed = self.refresh.update(self.walk, &self.lists[1], view.eye, &sight, tolerance);
+        self.refreshed =
+            self.refresh
+                .update(self.walk, &self.lists[1], view.eye, &sight, tolerance);
         if self.refreshed.evaluated > 0 {
             self.scene.set_glossy(&self.gpu, self.refresh.radiance());
         }
@@ -437,7 +514,7 @@ impl<'a> Live<'a> {
     }
 
     /// The next image to draw on; `None` where this frame is to be left out.
-    fn next_output(&mut self, instance: &wgpu::Instance) -> Result<Option<wgpu::SurfaceTexture>, WindowError> {
+    fn next_output(&mut self) -> Result<Option<wgpu::SurfaceTexture>, WindowError> {
         use wgpu::CurrentSurfaceTexture as Current;
         match self.surface.get_current_texture() {
             Current::Success(output) => return Ok(Some(output)),
@@ -453,7 +530,7 @@ impl<'a> Live<'a> {
                 self.window.request_redraw();
             }
             Current::Lost => {
-                self.surface = new_surface(instance, &self.window)?;
+                self.surface = self.gpu.surface(&self.window)?;
                 self.config = configuration(&self.gpu, &self.surface, &self.window)?;
                 self.configure();
                 self.window.request_redraw();
@@ -472,9 +549,15 @@ impl<'a> Live<'a> {
             return Ok(());
         }
         self.refresh_glossy(size);
-        let frame = Frame { view: &self.walker.view, tone: &self.tone(), mesh: self.walk.mesh() };
+        let frame = Frame {
+            view: &self.walker.view,
+            tone: &self.tone(),
+            mesh: self.walk.mesh(),
+        };
         let picture = Snapshot::draw(&self.gpu, &self.scene, size, &frame)?;
-        let path = (1..).map(|n| PathBuf::from(format!("hr-view-{n:03}.png"))).find(|path| !path.exists());
+        let path = (1..)
+            .map(|n| PathBuf::from(format!("hr-view-{n:03}.png")))
+            .find(|path| !path.exists());
         let Some(path) = path else { return Ok(()) };
         match picture.save_png(&path) {
             Ok(()) => {
@@ -488,11 +571,6 @@ impl<'a> Live<'a> {
     }
 }
 
-/// A surface on the window; it keeps the window alive.
-fn new_surface(instance: &wgpu::Instance, window: &Arc<Window>) -> Result<wgpu::Surface<'static>, WindowError> {
-    instance.create_surface(Arc::clone(window)).map_err(|error| WindowError::NoAdapter(one_line(&error)))
-}
-
 /// How the surface is drawn on: 8 bits, encoded by our own shader where possible, as egui prefers, without tearing.
 fn configuration(
     gpu: &Gpu,
@@ -503,11 +581,16 @@ fn configuration(
     let size = window.inner_size();
     let formats = surface.get_capabilities(&gpu.adapter).formats;
     let wanted = [Bgra8Unorm, Rgba8Unorm, Bgra8UnormSrgb, Rgba8UnormSrgb];
-    let format = wanted.into_iter().find(|f| formats.contains(f)).or_else(|| formats.first().copied());
+    let format = wanted
+        .into_iter()
+        .find(|f| formats.contains(f))
+        .or_else(|| formats.first().copied());
     let limit = gpu.device.limits().max_texture_dimension_2d;
     let none = || WindowError::NoAdapter("it cannot draw on this window".into());
     let format = format.ok_or_else(none)?;
-    let config = surface.get_default_config(&gpu.adapter, size.width, size.height).ok_or_else(none)?;
+    let config = surface
+        .get_default_config(&gpu.adapter, size.width, size.height)
+        .ok_or_else(none)?;
     Ok(wgpu::SurfaceConfiguration {
         format,
         width: size.width.min(limit),

@@ -19,9 +19,16 @@ pub(super) struct Uploader<'a> {
 
 impl<'a> Uploader<'a> {
     pub(super) fn new(gpu: &'a Gpu) -> Self {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0…255 by construction")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "0…255 by construction"
+        )]
         let code = |i: usize| (255.0 * srgb_encode(i as f32 / ENCODE as f32)).round() as u8;
-        Self { gpu, encode: (0..=ENCODE).map(code).collect() }
+        Self {
+            gpu,
+            encode: (0..=ENCODE).map(code).collect(),
+        }
     }
 
     /// A texture with its sampler.
@@ -56,7 +63,11 @@ impl<'a> Uploader<'a> {
         let mip_level_count = u32::BITS - width.max(height).leading_zeros();
         let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("texels"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
             mip_level_count,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -65,12 +76,27 @@ impl<'a> Uploader<'a> {
             view_formats: &[],
         });
         for mip_level in 0..mip_level_count {
-            let bytes: Vec<u8> = level.data.iter().flat_map(|texel| self.encoded(*texel)).collect();
+            let bytes: Vec<u8> = level
+                .data
+                .iter()
+                .flat_map(|texel| self.encoded(*texel))
+                .collect();
             self.gpu.queue.write_texture(
-                wgpu::TexelCopyTextureInfo { mip_level, ..texture.as_image_copy() },
+                wgpu::TexelCopyTextureInfo {
+                    mip_level,
+                    ..texture.as_image_copy()
+                },
                 &bytes,
-                wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * level.width), rows_per_image: None },
-                wgpu::Extent3d { width: level.width, height: level.height, depth_or_array_layers: 1 },
+                wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(4 * level.width),
+                    rows_per_image: None,
+                },
+                wgpu::Extent3d {
+                    width: level.width,
+                    height: level.height,
+                    depth_or_array_layers: 1,
+                },
             );
             if mip_level + 1 < mip_level_count {
                 level = Cow::Owned(halved(&level));
@@ -81,7 +107,11 @@ impl<'a> Uploader<'a> {
 
     fn encoded(&self, texel: Rgb) -> [u8; 4] {
         // Not-a-number casts to 0.
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped; saturates")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped; saturates"
+        )]
         let code = |x: f32| self.encode[(x.clamp(0.0, 1.0) * ENCODE as f32).round() as usize];
         [code(texel.x), code(texel.y), code(texel.z), 255]
     }
@@ -104,7 +134,11 @@ fn halved(texels: &Texels) -> Texels {
             data.push(sum);
         }
     }
-    Texels { width, height, data }
+    Texels {
+        width,
+        height,
+        data,
+    }
 }
 
 /// For each place of the next level, the places of this one that it covers, with weights that add up to 1.
@@ -114,10 +148,19 @@ fn footprints(size: u32) -> Vec<Vec<(usize, f32)>> {
     (0..half)
         .map(|i| {
             let (low, high) = (f64::from(i) * stride, f64::from(i + 1) * stride);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … size")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "0 … size"
+            )]
             let places = low as usize..(high.ceil() as usize).min(size as usize);
             places
-                .map(|x| (x, (((x + 1) as f64).min(high) - (x as f64).max(low)) / stride))
+                .map(|x| {
+                    (
+                        x,
+                        (((x + 1) as f64).min(high) - (x as f64).max(low)) / stride,
+                    )
+                })
                 .filter(|(_, w)| *w > 1e-9)
                 .map(|(x, w)| (x, w as f32))
                 .collect()
@@ -132,13 +175,23 @@ mod tests {
     #[test]
     fn mip_levels_keep_the_mean() {
         for (width, height) in [(1, 1), (2, 2), (3, 1), (5, 7), (8, 3), (1, 6)] {
-            let data: Vec<_> = (0..width * height).map(|i| Rgb::new(i as f32, (i * i) as f32, 1.0)).collect();
+            let data: Vec<_> = (0..width * height)
+                .map(|i| Rgb::new(i as f32, (i * i) as f32, 1.0))
+                .collect();
             let mean = |t: &Texels| t.data.iter().sum::<Rgb>() / t.data.len() as f32;
-            let mut level = Texels { width, height, data };
+            let mut level = Texels {
+                width,
+                height,
+                data,
+            };
             let expected = mean(&level);
             while level.width > 1 || level.height > 1 {
                 level = halved(&level);
-                assert_eq!(level.data.len(), (level.width * level.height) as usize, "{width} × {height} is filled");
+                assert_eq!(
+                    level.data.len(),
+                    (level.width * level.height) as usize,
+                    "{width} × {height} is filled"
+                );
                 // f32 sums of at most 35 numbers up to 1200, in another order.
                 let off = (mean(&level) - expected).abs().max_element();
                 assert!(off < 1e-2, "{width} × {height} drifts by {off}");

@@ -19,7 +19,10 @@ pub struct Curve {
 
 impl Curve {
     /// K. Narkowicz, "ACES Filmic Tone Mapping Curve", 2015: a fit of the reference rendering transform.
-    pub const ACES_FIT: Self = Self { numerator: [2.51, 0.03], denominator: [2.43, 0.59, 0.14] };
+    pub const ACES_FIT: Self = Self {
+        numerator: [2.51, 0.03],
+        denominator: [2.43, 0.59, 0.14],
+    };
 
     /// The curve at `x` ≥ 0, clamped to 0…1.
     #[must_use]
@@ -57,27 +60,47 @@ impl Tone {
         let emitted = |v: usize| mesh.emission[v];
         let mean = log_mean(mesh, to_srgb, diffuse).or_else(|| log_mean(mesh, to_srgb, emitted));
         let exposure = mean.map_or(1.0, |mean| (KEY / mean).clamp(1e-20, 1e20));
-        Self { exposure, to_srgb, curve: Curve::ACES_FIT }
+        Self {
+            exposure,
+            to_srgb,
+            curve: Curve::ACES_FIT,
+        }
     }
 
     /// sRGB-encoded colour, 0…1 per channel, of a radiance; black where that is not a number.
     #[must_use]
     pub fn apply(&self, radiance: Rgb) -> Vec3 {
         // Cut on both sides of the matrix: nothing may overflow in it, no negative channel may come out of it.
-        let exposed = (radiance * self.exposure).to_array().map(|x| x.max(0.0).min(BRIGHTEST));
+        let exposed = (radiance * self.exposure)
+            .to_array()
+            .map(|x| x.max(0.0).min(BRIGHTEST));
         let linear = self.to_srgb * Vec3::from_array(exposed);
-        Vec3::from_array(linear.to_array().map(|x| srgb_encode(self.curve.at(x.max(0.0)))))
+        Vec3::from_array(
+            linear
+                .to_array()
+                .map(|x| srgb_encode(self.curve.at(x.max(0.0)))),
+        )
     }
 }
 
 /// The nearest finite colour, black where not a number: shaders are not bound to carry infinities and NaN through.
 pub(super) fn finite(v: Rgb) -> Rgb {
-    Rgb::from_array(v.to_array().map(|x| if x.is_nan() { 0.0 } else { x.clamp(f32::MIN, f32::MAX) }))
+    Rgb::from_array(v.to_array().map(|x| {
+        if x.is_nan() {
+            0.0
+        } else {
+            x.clamp(f32::MIN, f32::MAX)
+        }
+    }))
 }
 
 /// The sRGB transfer function (IEC 61966-2-1) of a linear value in 0…1.
 pub(super) fn srgb_encode(x: f32) -> f32 {
-    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+    if x <= 0.003_130_8 {
+        12.92 * x
+    } else {
+        1.055 * x.powf(1.0 / 2.4) - 0.055
+    }
 }
 
 /// Geometric mean of the luminance of a radiance over all lit surface area; `None` where there is none.
@@ -88,7 +111,8 @@ fn log_mean(mesh: &DisplayMesh, to_srgb: Mat3, radiance: impl Fn(usize) -> Rgb) 
     for batch in &mesh.batches {
         let indices = &mesh.indices[batch.indices.start as usize..batch.indices.end as usize];
         for corners in indices.chunks_exact(3) {
-            let [a, b, c] = [corners[0], corners[1], corners[2]].map(|i| mesh.positions[i as usize]);
+            let [a, b, c] =
+                [corners[0], corners[1], corners[2]].map(|i| mesh.positions[i as usize]);
             let third = f64::from((b - a).cross(c - a).length()) / 6.0;
             for &corner in corners {
                 let luminance = weights.dot(radiance(corner as usize));
@@ -100,7 +124,10 @@ fn log_mean(mesh: &DisplayMesh, to_srgb: Mat3, radiance: impl Fn(usize) -> Rgb) 
         }
     }
     let mean = (sum / area).exp();
-    #[expect(clippy::cast_possible_truncation, reason = "checked to be finite after it")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "checked to be finite after it"
+    )]
     Some(mean as f32).filter(|m| m.is_finite() && *m > 0.0)
 }
 
@@ -110,8 +137,14 @@ fn to_srgb(primaries: Primaries) -> Mat3 {
         Primaries::Rec709 => Mat3::IDENTITY,
         Primaries::Radiance => {
             let third = 1.0 / 3.0;
-            let from = rgb_to_xyz([[0.640, 0.330], [0.290, 0.600], [0.150, 0.060]], [third, third]);
-            let to = rgb_to_xyz([[0.640, 0.330], [0.300, 0.600], [0.150, 0.060]], [0.3127, 0.3290]);
+            let from = rgb_to_xyz(
+                [[0.640, 0.330], [0.290, 0.600], [0.150, 0.060]],
+                [third, third],
+            );
+            let to = rgb_to_xyz(
+                [[0.640, 0.330], [0.300, 0.600], [0.150, 0.060]],
+                [0.3127, 0.3290],
+            );
             to.inverse() * bradford([third, third], [0.3127, 0.3290]) * from
         }
     }
@@ -147,9 +180,15 @@ mod tests {
     #[test]
     fn grey_stays_grey() {
         let grey = to_srgb(Primaries::Radiance) * Vec3::splat(0.5);
-        assert!((grey - Vec3::splat(0.5)).abs().max_element() < 1e-5, "neutral moved to {grey}");
+        assert!(
+            (grey - Vec3::splat(0.5)).abs().max_element() < 1e-5,
+            "neutral moved to {grey}"
+        );
         let green = to_srgb(Primaries::Radiance) * Vec3::Y;
-        assert!(green.x < 0.0, "the wider green lies outside sRGB, got {green}");
+        assert!(
+            green.x < 0.0,
+            "the wider green lies outside sRGB, got {green}"
+        );
     }
 
     #[test]
@@ -160,24 +199,45 @@ mod tests {
 
     #[test]
     fn curve_rises_and_nonsense_is_black() {
-        let tone = Tone { exposure: 1.0, to_srgb: Mat3::IDENTITY, curve: Curve::ACES_FIT };
+        let tone = Tone {
+            exposure: 1.0,
+            to_srgb: Mat3::IDENTITY,
+            curve: Curve::ACES_FIT,
+        };
         let mut last = -1.0;
         for step in 0..200 {
             let y = tone.curve.at(0.02 * step as f32);
-            assert!(y >= last && (0.0..=1.0).contains(&y), "not monotone at step {step}: {last} to {y}");
+            assert!(
+                y >= last && (0.0..=1.0).contains(&y),
+                "not monotone at step {step}: {last} to {y}"
+            );
             last = y;
         }
         let white = tone.apply(Rgb::splat(f32::INFINITY));
-        assert!((white - Vec3::ONE).abs().max_element() < 1e-6, "infinitely bright is white, not {white}");
-        assert_eq!(tone.apply(Rgb::splat(f32::NAN)), Vec3::ZERO, "not a number is black");
-        assert_eq!(tone.apply(Rgb::splat(-1.0)), Vec3::ZERO, "negative is black");
+        assert!(
+            (white - Vec3::ONE).abs().max_element() < 1e-6,
+            "infinitely bright is white, not {white}"
+        );
+        assert_eq!(
+            tone.apply(Rgb::splat(f32::NAN)),
+            Vec3::ZERO,
+            "not a number is black"
+        );
+        assert_eq!(
+            tone.apply(Rgb::splat(-1.0)),
+            Vec3::ZERO,
+            "negative is black"
+        );
     }
 
     #[test]
     fn exposure_does_not_depend_on_meshing() {
         // A unit square of radiance 2 beside one of radiance 8, the latter once as two triangles, once as many.
         let mesh = |fine: usize| {
-            let mut mesh = DisplayMesh { primaries: Primaries::Rec709, ..DisplayMesh::default() };
+            let mut mesh = DisplayMesh {
+                primaries: Primaries::Rec709,
+                ..DisplayMesh::default()
+            };
             let mut strip = |x: f32, width: f32, light: f32| {
                 let first = u32::try_from(mesh.positions.len()).expect("a small mesh");
                 for (dx, dy) in [(0.0, 0.0), (width, 0.0), (width, 1.0), (0.0, 1.0)] {
@@ -193,14 +253,24 @@ mod tests {
             let n = mesh.positions.len();
             (mesh.normals, mesh.tint) = (vec![Vec3::Z; n], vec![Rgb::ONE; n]);
             (mesh.emission, mesh.uv) = (vec![Rgb::ZERO; n], vec![Vec2::ZERO; n]);
-            mesh.batches = vec![Batch { indices: 0..u32::try_from(mesh.indices.len()).expect("small"), texture: None }];
+            mesh.batches = vec![Batch {
+                indices: 0..u32::try_from(mesh.indices.len()).expect("small"),
+                texture: None,
+            }];
             mesh
         };
         for fine in [1, 16] {
             let exposure = Tone::for_mesh(&mesh(fine)).exposure;
             // Geometric mean of 2 and 8 over equal areas is 4.
-            assert!((exposure - KEY / 4.0).abs() < 1e-5, "{fine} strips gave {exposure}");
+            assert!(
+                (exposure - KEY / 4.0).abs() < 1e-5,
+                "{fine} strips gave {exposure}"
+            );
         }
-        assert_eq!(Tone::for_mesh(&DisplayMesh::default()).exposure, 1.0, "nothing to expose for");
+        assert_eq!(
+            Tone::for_mesh(&DisplayMesh::default()).exposure,
+            1.0,
+            "nothing to expose for"
+        );
     }
 }

@@ -23,24 +23,56 @@ pub(crate) struct Room {
 impl Room {
     /// Each face is a grid of `n` × `n` quadrilaterals.
     pub(crate) fn new(n: u16) -> Self {
-        let mut mesh = DisplayMesh { origin: ORIGIN, primaries: Primaries::Rec709, ..DisplayMesh::default() };
+        let mut mesh = DisplayMesh {
+            origin: ORIGIN,
+            primaries: Primaries::Rec709,
+            ..DisplayMesh::default()
+        };
         let (x, y, z) = (Vec3::X * 4.0, Vec3::Y * 3.0, Vec3::Z * 3.0);
         let grey = Rgb::splat(0.7);
         face(&mut mesh, n, [z, y, x], grey, Rgb::ZERO);
-        face(&mut mesh, n, [Vec3::ZERO, z, x], Rgb::new(0.75, 0.12, 0.1), Rgb::ZERO);
-        face(&mut mesh, n, [y, x, z], Rgb::new(0.1, 0.25, 0.75), Rgb::ZERO);
+        face(
+            &mut mesh,
+            n,
+            [Vec3::ZERO, z, x],
+            Rgb::new(0.75, 0.12, 0.1),
+            Rgb::ZERO,
+        );
+        face(
+            &mut mesh,
+            n,
+            [y, x, z],
+            Rgb::new(0.1, 0.25, 0.75),
+            Rgb::ZERO,
+        );
         face(&mut mesh, n, [Vec3::ZERO, y, z], grey, Rgb::ZERO);
         let half = 0.3;
         let corner = LAMP - Vec3::new(half, half, 0.0);
-        face(&mut mesh, 1, [corner, Vec3::Y * (2.0 * half), Vec3::X * (2.0 * half)], Rgb::ZERO, Rgb::splat(30.0));
+        face(
+            &mut mesh,
+            1,
+            [corner, Vec3::Y * (2.0 * half), Vec3::X * (2.0 * half)],
+            Rgb::ZERO,
+            Rgb::splat(30.0),
+        );
         let floor = mesh.positions.len();
         face(&mut mesh, n, [Vec3::ZERO, x, y], Rgb::splat(0.2), Rgb::ZERO);
-        mesh.glossy = (floor..mesh.positions.len()).map(|v| u32::try_from(v).expect("small")).collect();
+        mesh.glossy = (floor..mesh.positions.len())
+            .map(|v| u32::try_from(v).expect("small"))
+            .collect();
         let plain = u32::try_from(mesh.indices.len()).expect("small");
         face(&mut mesh, n, [x, z, y], Rgb::ONE, Rgb::ZERO);
         let all = u32::try_from(mesh.indices.len()).expect("small");
-        mesh.batches =
-            vec![Batch { indices: 0..plain, texture: None }, Batch { indices: plain..all, texture: Some(0) }];
+        mesh.batches = vec![
+            Batch {
+                indices: 0..plain,
+                texture: None,
+            },
+            Batch {
+                indices: plain..all,
+                texture: Some(0),
+            },
+        ];
         mesh.textures.push(checks());
         let camera = |eye: [f64; 3], target: [f64; 3]| Camera {
             eye: (ORIGIN + DVec3::from(eye)).into(),
@@ -51,8 +83,14 @@ impl Room {
             height: 400,
         };
         let cameras = vec![
-            ("entrance".to_owned(), camera([0.3, 1.5, 1.6], [4.0, 1.5, 1.0])),
-            ("corner".to_owned(), camera([0.4, 2.6, 2.4], [3.5, 0.5, 0.2])),
+            (
+                "entrance".to_owned(),
+                camera([0.3, 1.5, 1.6], [4.0, 1.5, 1.0]),
+            ),
+            (
+                "corner".to_owned(),
+                camera([0.4, 2.6, 2.4], [3.5, 0.5, 0.2]),
+            ),
         ];
         Self { mesh, cameras }
     }
@@ -81,7 +119,13 @@ impl Walkable for Room {
 }
 
 /// A parallelogram from a corner along two edges, facing edge 1 × edge 2, as a grid.
-fn face(mesh: &mut DisplayMesh, n: u16, [corner, a, b]: [Vec3; 3], reflectance: Rgb, emission: Rgb) {
+fn face(
+    mesh: &mut DisplayMesh,
+    n: u16,
+    [corner, a, b]: [Vec3; 3],
+    reflectance: Rgb,
+    emission: Rgb,
+) {
     let first = u32::try_from(mesh.positions.len()).expect("small");
     let normal = a.cross(b).normalize();
     let side = u32::from(n) + 1;
@@ -93,7 +137,8 @@ fn face(mesh: &mut DisplayMesh, n: u16, [corner, a, b]: [Vec3; 3], reflectance: 
             let light = normal.dot(to.normalize_or_zero()).max(0.0) / to.length_squared().max(0.1);
             mesh.positions.push(p);
             mesh.normals.push(normal);
-            mesh.irradiance.push(Rgb::splat(1.5) + Rgb::splat(12.0 * light));
+            mesh.irradiance
+                .push(Rgb::splat(1.5) + Rgb::splat(12.0 * light));
             mesh.tint.push(reflectance * FRAC_1_PI);
             mesh.emission.push(emission);
             mesh.uv.push(uv);
@@ -102,7 +147,8 @@ fn face(mesh: &mut DisplayMesh, n: u16, [corner, a, b]: [Vec3; 3], reflectance: 
     for i in 0..u32::from(n) {
         for j in 0..u32::from(n) {
             let k = first + i * side + j;
-            mesh.indices.extend([k, k + side, k + side + 1, k, k + side + 1, k + 1]);
+            mesh.indices
+                .extend([k, k + side, k + side + 1, k, k + side + 1, k + 1]);
         }
     }
 }
@@ -110,9 +156,19 @@ fn face(mesh: &mut DisplayMesh, n: u16, [corner, a, b]: [Vec3; 3], reflectance: 
 fn checks() -> Texture {
     let size = 64_u32;
     let dark = |i: u32| (i % size / 8 + i / size / 8).is_multiple_of(2);
-    let data = (0..size * size).map(|i| if dark(i) { Rgb::splat(0.1) } else { Rgb::new(0.8, 0.7, 0.4) });
+    let data = (0..size * size).map(|i| {
+        if dark(i) {
+            Rgb::splat(0.1)
+        } else {
+            Rgb::new(0.8, 0.7, 0.4)
+        }
+    });
     Texture {
-        texels: Arc::new(Texels { width: size, height: size, data: data.collect() }),
+        texels: Arc::new(Texels {
+            width: size,
+            height: size,
+            data: data.collect(),
+        }),
         transform: Mat3::from_scale(Vec2::splat(2.0)),
         wrap: [Wrap::Repeat; 2],
     }
