@@ -1,1 +1,452 @@
-//! The adaptive Haar basis on the octahedron (paper, section 4.2).
+//! The adaptive Haar basis on the octahedron (paper, section 4.2): what a surface element or a cluster sends out, by
+//! direction.
+//!
+//! The sphere of directions is an octahedron with its corners on the main axes of world space, each face divided in
+//! four recursively, finer where the function varies ([`Haar::project`]). Triangles that share an edge differ by at
+//! most one level. Values are kept at the corners of the triangles and interpolated linearly, so that
+//! [`Haar::eval`] is continuous over the whole sphere: where a triangle borders a finer one, the value at the middle
+//! of the common edge belongs to both.
+//!
+//! ```
+//! use glam::Vec3;
+//! use glossy_ext::haar::{Haar, Known, Peak, Refinement};
+//!
+//! // A lobe about 6° wide, and the direction in which it must not be missed.
+//! let axis = Vec3::new(0.3, -0.2, 0.9).normalize();
+//! let lobe = |d: Vec3| Vec3::splat(d.dot(axis).max(0.0).powi(200));
+//! let peaks = [Peak { direction: axis, width: 0.1 }];
+//! let made = Haar::project(&Refinement::default(), &Known { peaks: &peaks, ..Known::NOTHING }, lobe);
+//! assert!((made.haar.eval(axis).x - 1.0).abs() < 0.05);
+//! assert!(made.haar.eval(-axis).x < 1e-3);
+//! ```
+//!
+//! # Layout
+//! A *basis function* is one undivided triangle ([`Haar::basis_functions`]). At rest a distribution is an array of
+//! vertex values (three half floats relative to a scale of the whole distribution: 2⁻¹¹ relative precision, values
+//! below 2⁻²⁹ of the largest component are zero) and an array of 8-byte nodes: one for each divided triangle,
+//! holding the vertices in the middle of its edges and where its children's nodes are, and one for each undivided
+//! triangle beside a finer one, holding the midpoints that it shares. Undivided triangles need no storage of their
+//! own and there is half a vertex to each, so that 6 to 8 bytes are used per basis function. The empty
+//! distribution, zero everywhere, allocates nothing.
+//!
+//! # Limits
+//! Indices have 15 bits: a distribution has up to 24,576 vertices, about 49,000 basis functions (level 6 everywhere,
+//! or finer in parts). Refinement stops there, coarse levels first, and says so ([`Projected::truncated`]).
+
+mod combine;
+mod half;
+mod mesh;
+mod project;
+#[cfg(test)]
+mod tests;
+mod triangle;
+
+pub use project::{Beyond, Known, Peak, Projected, Refinement, Refiner, Support};
+
+use crate::Rgb;
+use glam::{DVec3, Vec3};
+use half::{Half3, decode, encode, scale_for};
+use hr_diffuse::Cone;
+use triangle::{ConeTest, Triangle, child_corners, face_corners, midpoints};
+
+/// Deepest level of subdivision: triangles 0.02° across. Positions stay exact and barycentric coordinates, which
+/// lose a bit per level, keep more than what half floats can show.
+pub const MAX_LEVEL: u8 = 12;
+
+/// Deepest level that may be asked for everywhere: 16,386 vertices, more would not fit.
+pub const MAX_UNIFORM_LEVEL: u8 = 6;
+
+/// A directional distribution of a signed RGB quantity over the sphere, in world space.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Haar {
+    /// What vertex values are multiplied by; ≥ 0.
+    scale: f32,
+    /// Bit f: face f has a node. The nodes of the faces come first, in order.
+    roots: u8,
+    /// The corners of the octahedron (+x, −x, +y, −y, +z, −z) come first. Empty: zero everywhere.
+    vertices: Box<[Half3]>,
+    nodes: Box<[Node]>,
+}
+
+/// From low to high bits: three vertex indices of 15 bits, the index of the first child's node of 15 bits, four bits
+/// that tell which children have a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(transparent)]
+struct Node(u64);
+
+impl Node {
+    const NO_VERTEX: u16 = 0x7fff;
+
+    fn new(mids: [u16; 3], base: usize, mask: u64) -> Self {
+        let [a, b, c] = mids.map(u64::from);
+        Self(a | b << 15 | c << 30 | (base as u64 & 0x7fff) << 45 | mask << 60)
+    }
+
+    #[inline]
+    fn mids(self) -> [u16; 3] {
+        [0, 15, 30].map(|shift| (self.0 >> shift) as u16 & 0x7fff)
+    }
+
+    /// Whether this stands for four triangles rather than for an undivided one with some finer neighbours.
+    #[inline]
+    fn is_divided(self) -> bool {
+        self.mids().iter().all(|&m| m != Self::NO_VERTEX)
+    }
+
+    /// Index of a child's node.
+    #[inline]
+    fn child(self, child: usize) -> Option<usize> {
+        let mask = (self.0 >> 60) as usize;
+        if mask >> child & 1 == 0 {
+            return None;
+        }
+        // How many of the up to three children before this one have a node: popcounts of 0…7, two bits each.
+        const COUNTS: usize = 0b11_10_10_01_10_01_01_00;
+        let before = mask & ((1 << child) - 1);
+        let base = (self.0 >> 45) as usize & 0x7fff;
+        Some(base + (COUNTS >> (2 * before) & 3))
+    }
+}
+
+/// A triangle on the way down the tree.
+#[derive(Clone, Copy)]
+struct Visit {
+    triangle: Triangle,
+    vertices: [u16; 3],
+    node: Option<usize>,
+    level: u8,
+}
+
+impl Haar {
+    /// The corners of a face of the octahedron as vertex indices.
+    #[inline]
+    fn face_vertices(face: usize) -> [u16; 3] {
+        let face = face as u16;
+        [face & 1, 2 + (face >> 1 & 1), 4 + (face >> 2 & 1)]
+    }
+
+    #[inline]
+    fn root(&self, face: usize) -> Option<usize> {
+        let roots = u32::from(self.roots);
+        (roots >> face & 1 == 1).then(|| (roots & ((1 << face) - 1)).count_ones() as usize)
+    }
+
+    #[inline]
+    fn vertex(&self, vertex: u16) -> Rgb {
+        decode(self.vertices[usize::from(vertex)])
+    }
+
+    /// Values at midpoints, linear where there is no vertex. In units of the scale.
+    #[inline]
+    fn mid_values(&self, corners: [Rgb; 3], node: Node) -> [Rgb; 3] {
+        let between = midpoints(corners);
+        let mids = node.mids();
+        [0, 1, 2].map(|e| {
+            if mids[e] == Node::NO_VERTEX {
+                between[e]
+            } else {
+                self.vertex(mids[e])
+            }
+        })
+    }
+
+    /// The value in a direction, which need not have unit length. Zero for a direction that is zero or not finite.
+    ///
+    /// Linear in the direction's point on the octahedron over each triangle; between the smallest and the largest
+    /// of the values at its corners.
+    #[must_use]
+    pub fn eval(&self, direction: Vec3) -> Rgb {
+        let size = direction.abs();
+        let sum = size.x + size.y + size.z;
+        if self.vertices.is_empty() || !(sum > 0.0 && sum < f32::INFINITY) {
+            return Rgb::ZERO;
+        }
+        let negative = direction.cmplt(Vec3::ZERO).bitmask() as usize;
+        // Barycentric coordinates are the point's coordinates on the octahedron.
+        let mut at = size / sum;
+        let mut corners = Self::face_vertices(negative);
+        let mut node = self.root(negative);
+        while let Some(index) = node {
+            let here = self.nodes[index];
+            if !here.is_divided() {
+                let values = corners.map(|v| self.vertex(v));
+                let child = descend(&mut at);
+                let [a, b, c] = child_corners(values, self.mid_values(values, here), child);
+                return interpolate(at, a, b, c) * self.scale;
+            }
+            let child = descend(&mut at);
+            corners = child_corners(corners, here.mids(), child);
+            node = here.child(child);
+        }
+        let [a, b, c] = corners.map(|v| self.vertex(v));
+        interpolate(at, a, b, c) * self.scale
+    }
+
+    /// The smallest and largest value of [`eval`](Self::eval) over a cone, per channel: bounds that are never crossed,
+    /// and attained up to the interpolation over parts of the size of the cone.
+    #[must_use]
+    pub fn bounds(&self, cone: &Cone) -> (Rgb, Rgb) {
+        if self.vertices.is_empty() {
+            return (Rgb::ZERO, Rgb::ZERO);
+        }
+        let test = ConeTest::new(cone);
+        let mut low = Rgb::MAX;
+        let mut high = Rgb::MIN;
+        self.pieces(
+            &mut |visit| visit.triangle.touches(&test),
+            &mut |triangle, values| {
+                bound_piece(
+                    triangle,
+                    values,
+                    cone,
+                    &test,
+                    PIECE_SPLITS,
+                    &mut low,
+                    &mut high,
+                );
+            },
+        );
+        // Rounding in the interpolation, a few units in the last place of the largest value involved.
+        let slack = low.abs().max(high.abs()) * (4.0 * f32::EPSILON);
+        ((low - slack) * self.scale, (high + slack) * self.scale)
+    }
+
+    /// ∫ over the sphere, per steradian of the quantity: of intensity (W/sr), the power (W).
+    #[must_use]
+    pub fn integral(&self) -> Rgb {
+        self.integrate(&|_| 1.0, &|_| false)
+    }
+
+    /// ∫ of the quantity times the cosine to `normal` (unit length) over the hemisphere around it: of radiance
+    /// (W/(m² sr)), the radiosity (W/m²).
+    #[must_use]
+    pub fn cosine_integral(&self, normal: Vec3) -> Rgb {
+        let inside = |t: &Triangle| t.corners.iter().all(|c| c.dot(normal) >= 0.0);
+        let outside = |t: &Triangle| t.corners.iter().all(|c| c.dot(normal) <= 0.0);
+        self.integrate(&|d| d.dot(normal).max(0.0), &|t| !inside(t) && !outside(t))
+    }
+
+    /// Quadrature over the pieces, finer in those where the weight has a kink.
+    fn integrate(&self, weight: &impl Fn(Vec3) -> f32, kink: &impl Fn(&Triangle) -> bool) -> Rgb {
+        if self.vertices.is_empty() {
+            return Rgb::ZERO;
+        }
+        let mut sum = DVec3::ZERO;
+        self.pieces(&mut |_| true, &mut |triangle, values| {
+            // The Jacobian varies by 5.2 over a face of the octahedron; a radius of 15° is little enough for degree 5.
+            let wide = [(0.966, 0), (0.85, 1)]
+                .iter()
+                .find(|(cos, _)| triangle.cos_radius() >= *cos)
+                .map_or(2, |w| w.1);
+            let splits = if kink(triangle) { wide + 2 } else { wide };
+            sum += triangle
+                .integrate(values.map(|v| v.as_dvec3()), splits, weight)
+                .0;
+        });
+        (sum * f64::from(self.scale)).as_vec3()
+    }
+
+    /// Visits the linear pieces under all triangles that `enter` lets pass, with values in units of the scale.
+    fn pieces(
+        &self,
+        enter: &mut impl FnMut(&Visit) -> bool,
+        piece: &mut impl FnMut(&Triangle, [Rgb; 3]),
+    ) {
+        for face in 0..8 {
+            let triangle = Triangle::new(face_corners(face));
+            let vertices = Self::face_vertices(face);
+            let visit = Visit {
+                triangle,
+                vertices,
+                node: self.root(face),
+                level: 0,
+            };
+            self.pieces_below(&visit, enter, piece);
+        }
+    }
+
+    fn pieces_below(
+        &self,
+        visit: &Visit,
+        enter: &mut impl FnMut(&Visit) -> bool,
+        piece: &mut impl FnMut(&Triangle, [Rgb; 3]),
+    ) {
+        if !enter(visit) {
+            return;
+        }
+        let values = || visit.vertices.map(|v| self.vertex(v));
+        let Some(index) = visit.node else {
+            return piece(&visit.triangle, values());
+        };
+        let node = self.nodes[index];
+        if node.is_divided() {
+            for child in 0..4 {
+                let below = Visit {
+                    triangle: visit.triangle.child(child),
+                    vertices: child_corners(visit.vertices, node.mids(), child),
+                    node: node.child(child),
+                    level: visit.level + 1,
+                };
+                self.pieces_below(&below, enter, piece);
+            }
+        } else {
+            let corners = values();
+            let mids = self.mid_values(corners, node);
+            for child in 0..4 {
+                piece(
+                    &visit.triangle.child(child),
+                    child_corners(corners, mids, child),
+                );
+            }
+        }
+    }
+
+    /// The directions of the vertices (on the octahedron, not normalised), in the order of storage.
+    fn positions(&self) -> Vec<Vec3> {
+        let mut positions = vec![Vec3::ZERO; self.vertices.len()];
+        let mut enter = |visit: &Visit| {
+            for (vertex, corner) in visit.vertices.iter().zip(visit.triangle.corners) {
+                positions[usize::from(*vertex)] = corner;
+            }
+            true
+        };
+        self.pieces(&mut enter, &mut |_, _| ());
+        positions
+    }
+
+    /// Applies a function of (unit direction, value) to the value at every vertex. The subdivision stays: where the
+    /// result varies faster than this distribution did, [`project`](Self::project) one from [`eval`](Self::eval).
+    /// Results that are not finite count as 0.
+    #[must_use]
+    pub fn map(&self, mut f: impl FnMut(Vec3, Rgb) -> Rgb) -> Self {
+        let values: Vec<Rgb> = std::iter::zip(self.positions(), &*self.vertices)
+            .map(|(p, &v)| f(p.normalize(), decode(v) * self.scale))
+            .map(|v| if v.is_finite() { v } else { Rgb::ZERO })
+            .collect();
+        let scale = scale_for(
+            values
+                .iter()
+                .map(|v| v.abs().max_element())
+                .fold(0.0, f32::max),
+        );
+        if scale == 0.0 {
+            return Self::default();
+        }
+        let vertices = values.iter().map(|&v| encode(v, scale)).collect();
+        Self {
+            scale,
+            vertices,
+            ..self.clone()
+        }
+    }
+
+    /// Multiplies every value. A factor that is not finite, or that leaves nothing representable, empties.
+    pub fn scale(&mut self, factor: f32) {
+        let scale = self.scale * factor.abs();
+        if !(scale.is_finite() && scale >= f32::MIN_POSITIVE) {
+            *self = Self::default();
+        } else if factor < 0.0 {
+            *self = self.map(|_, v| v * factor);
+        } else {
+            self.scale = scale;
+        }
+    }
+
+    /// Whether the distribution is zero everywhere and stores nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.vertices.is_empty()
+    }
+
+    /// Undivided triangles: what the paper counts as directional basis functions. 0 if empty.
+    #[must_use]
+    pub fn basis_functions(&self) -> usize {
+        if self.is_empty() {
+            return 0;
+        }
+        8 + 3 * self.nodes.iter().filter(|node| node.is_divided()).count()
+    }
+
+    /// Level of the finest triangle; 0 for an octahedron.
+    #[must_use]
+    pub fn max_level(&self) -> u8 {
+        let mut level = 0;
+        let mut enter = |visit: &Visit| {
+            level = level.max(visit.level);
+            true
+        };
+        if !self.is_empty() {
+            self.pieces(&mut enter, &mut |_, _| ());
+        }
+        level
+    }
+
+    /// Memory in bytes, on the heap and in place.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>() + size_of_val(&*self.vertices) + size_of_val(&*self.nodes)
+    }
+}
+
+/// One step down: which child holds the point, and its barycentric coordinates there.
+#[inline]
+fn descend(at: &mut Vec3) -> usize {
+    let twice = *at + *at;
+    let corner = twice.cmpge(Vec3::ONE).bitmask();
+    if corner == 0 {
+        *at = Vec3::ONE - twice;
+        return 3;
+    }
+    // The lowest bit set; two are only where a midpoint is a corner of either child.
+    let child = corner.trailing_zeros() as usize;
+    *at = twice;
+    at[child] -= 1.0;
+    child
+}
+
+/// Linear interpolation. Coordinates are never negative, but their sum drifts from 1 by the rounding of the first
+/// division, doubled on each level: without its correction a constant would not be one.
+#[inline]
+fn interpolate(at: Vec3, a: Rgb, b: Rgb, c: Rgb) -> Rgb {
+    (at.x * a + at.y * b + at.z * c) / (at.x + at.y + at.z)
+}
+
+/// How often [`Haar::bounds`] divides a linear piece that is much larger than the cone.
+const PIECE_SPLITS: u32 = 6;
+
+/// Extends bounds by a linear piece, by its parts that the cone touches where it is larger than the cone.
+fn bound_piece(
+    triangle: &Triangle,
+    values: [Rgb; 3],
+    cone: &Cone,
+    test: &ConeTest,
+    splits: u32,
+    low: &mut Rgb,
+    high: &mut Rgb,
+) {
+    let (min, max) = (
+        values[0].min(values[1]).min(values[2]),
+        values[0].max(values[1]).max(values[2]),
+    );
+    if min.cmpge(*low).all() && max.cmple(*high).all() || !triangle.touches(test) {
+        return;
+    }
+    if splits == 0 || triangle.cos_radius() >= cone.cos_angle {
+        *low = low.min(min);
+        *high = high.max(max);
+        return;
+    }
+    let mids = midpoints(values);
+    for child in 0..4 {
+        let part = child_corners(values, mids, child);
+        bound_piece(
+            &triangle.child(child),
+            part,
+            cone,
+            test,
+            splits - 1,
+            low,
+            high,
+        );
+    }
+}

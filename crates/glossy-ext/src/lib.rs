@@ -2,8 +2,12 @@
 //! reflectors, after Stamminger et al., "Efficient Glossy Global Illumination with Interactive Viewing", Computer
 //! Graphics Forum 19(1), 2000. It plugs into an engine through the hooks of `hr-diffuse` only.
 
+pub mod field;
 pub mod haar;
 pub mod reflector;
+pub mod samples;
 
+pub use field::GlossyField;
 pub use hr_diffuse::Rgb;
-pub use reflector::{Lobe, Reflector, Sample};
+pub use reflector::{Incident, Lambert, Lobe, MetallicRoughness, Phong, Reflector, ReflectorError, Sample, Sum, Ward};
+pub use samples::{IlluminationSample, Place, SampleSet, arriving};

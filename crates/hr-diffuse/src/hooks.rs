@@ -1,15 +1,16 @@
 //! The hooks: what an engine shows to extensions, and what an extension does with the light that passes.
 //!
-//! An engine owns one [`LightField::State`] per node of its hierarchy and calls, in each iteration:
+//! An engine owns one [`LightField::Incident`] and one [`LightField::Exitant`] per node of its hierarchy and calls,
+//! in each iteration:
 //!
-//! 1. [`clear`](LightField::clear) on every active node,
-//! 2. [`receive`](LightField::receive) once per link, on the receiver's own state (*gather*),
-//! 3. [`reflect`](LightField::reflect) on every active leaf, with the states on the path from the root down to it:
-//!    their union is the leaf's incident light (*push*, without a copy),
-//! 4. [`pull`](LightField::pull) on every active inner node, children before parents.
+//! 1. [`clear`](LightField::clear) on the incident light of every active node,
+//! 2. [`receive`](LightField::receive) once per link, on the receiver's own incident light (*gather*),
+//! 3. [`reflect`](LightField::reflect) for every active leaf, with the incident light of all nodes on the path from
+//!    the root down to it: their union is what arrives there (*push*, without a copy),
+//! 4. [`pull`](LightField::pull) for every active inner node, children before parents.
 //!
-//! Receivers run in parallel; each call may write only the state it is given. [`radiance`](LightField::radiance)
-//! and [`radiance_bounds`](LightField::radiance_bounds) are read while links are refined and gathered.
+//! Receivers run in parallel; each call writes only what it is given or returns, and reads only what the step
+//! before made: gather reads exitant and writes incident light, reflect and pull the reverse.
 
 use crate::{Cone, Rgb};
 use glam::Vec3;
@@ -47,13 +48,25 @@ pub trait Hierarchy: Sync {
     fn area(&self, node: NodeId) -> f32;
     /// Material of an element of a surface; `None` for clusters and for lights without extent.
     fn material(&self, node: NodeId) -> Option<u32>;
-    /// Unit direction toward a sender as seen from `at`, and the angular radius of the sender in radians.
+    /// Unit direction toward a sender as seen from `at`, and the angular radius (radians) of a disk that subtends
+    /// the same solid angle as the sender.
     fn direction_to(&self, sender: NodeId, at: Vec3) -> (Vec3, f32) {
         let to = self.center(sender) - at;
         let distance = to.length().max(f32::MIN_POSITIVE);
         (to / distance, (self.radius(sender) / distance).min(1.0).asin())
     }
+    /// Whether a sender is infinitely far: its direction is the same from everywhere.
+    fn is_distant(&self, _sender: NodeId) -> bool {
+        false
+    }
+    /// Whether the node is a part of one plane, so that all of it is oriented alike.
+    fn is_flat(&self, node: NodeId) -> bool {
+        self.material(node).is_some() && self.normals(node).cos_angle > FLAT_COSINE
+    }
 }
+
+/// Normals within this cosine (0.8°) count as one.
+pub const FLAT_COSINE: f32 = 0.9999;
 
 /// One link's light as it arrives at the receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,47 +85,45 @@ pub struct Transfer {
 
 /// What light does besides being diffuse radiosity. `()` is the purely diffuse engine, at no cost.
 pub trait LightField: Sync {
-    /// What the extension keeps per node. The default is "nothing here".
-    type State: Default + Send + Sync;
+    /// What the extension keeps of a node's incident light. The default is "nothing here".
+    type Incident: Default + Send + Sync;
+    /// What it keeps of a node's exitant light. The default is "nothing here".
+    type Exitant: Default + Send + Sync;
 
-    /// Whether surfaces of this material take part. Nodes without any such surface below them are never visited.
-    fn is_active(&self, material: u32) -> bool;
-    /// Forgets the incident light of a node, before links are gathered anew; the exitant light stays.
-    fn clear(&self, state: &mut Self::State);
+    /// What surfaces of this material reflect beside the diffuse part (largest channel of a reflectance, 0…1), or
+    /// `None` where they do not take part. Nodes without any active surface below them are never visited.
+    fn active(&self, material: u32) -> Option<f32>;
+    /// Forgets a node's incident light, before links are gathered anew.
+    fn clear(&self, incident: &mut Self::Incident);
     /// Takes one link's light at its receiver, which may be a leaf, an inner element or a cluster.
-    fn receive(&self, state: &mut Self::State, transfer: &Transfer);
-    /// Turns a leaf's incident light into exitant light. `path` holds the states from the root to the leaf's
-    /// parent: their samples arrive at the leaf too. `diffuse` is the leaf's diffuse radiance, against which
-    /// glossy detail may be judged negligible.
-    fn reflect<H: Hierarchy>(
-        &self,
-        hierarchy: &H,
-        leaf: NodeId,
-        path: &[&Self::State],
-        state: &mut Self::State,
-        diffuse: Rgb,
-    );
-    /// Averages the children's exitant light, weighted by area. `children` are the states of
-    /// `hierarchy.children(parent)`, in order.
-    fn pull<H: Hierarchy>(&self, hierarchy: &H, parent: NodeId, state: &mut Self::State, children: &[Self::State]);
-    /// Exitant radiance (W/(m² sr)) in a direction away from the node, without the diffuse part. For nodes that
-    /// are not flat: radiant intensity per unit of [`Hierarchy::area`].
-    fn radiance(&self, state: &Self::State, away: Vec3) -> Rgb;
+    fn receive(&self, incident: &mut Self::Incident, transfer: &Transfer);
+    /// A leaf's exitant light from its incident light. `path` holds that of all nodes from the root down to the
+    /// leaf itself, which comes last. `diffuse` is the leaf's diffuse radiance, beside which glossy detail may be
+    /// negligible.
+    fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&Self::Incident], diffuse: Rgb)
+    -> Self::Exitant;
+    /// The children's exitant light averaged, weighted by area. `children` are in the order of
+    /// `hierarchy.children(parent)`.
+    fn pull<H: Hierarchy>(&self, hierarchy: &H, parent: NodeId, children: &[Self::Exitant]) -> Self::Exitant;
+    /// Exitant radiance (W/(m² sr)) in a direction away from a node, without the diffuse part. For nodes that are
+    /// not flat: radiant intensity per unit of [`Hierarchy::area`].
+    fn radiance(&self, exitant: &Self::Exitant, away: Vec3) -> Rgb;
     /// Smallest and largest [`radiance`](Self::radiance) over a cone of directions.
-    fn radiance_bounds(&self, state: &Self::State, away: &Cone) -> (Rgb, Rgb);
+    fn radiance_bounds(&self, exitant: &Self::Exitant, away: &Cone) -> (Rgb, Rgb);
 }
 
 /// The purely diffuse engine.
 impl LightField for () {
-    type State = ();
+    type Incident = ();
+    type Exitant = ();
 
-    fn is_active(&self, _: u32) -> bool {
-        false
+    fn active(&self, _: u32) -> Option<f32> {
+        None
     }
     fn clear(&self, (): &mut ()) {}
     fn receive(&self, (): &mut (), _: &Transfer) {}
-    fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], (): &mut (), _: Rgb) {}
-    fn pull<H: Hierarchy>(&self, _: &H, _: NodeId, (): &mut (), _: &[()]) {}
+    fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], _: Rgb) {}
+    fn pull<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[()]) {}
     fn radiance(&self, (): &(), _: Vec3) -> Rgb {
         Rgb::ZERO
     }

@@ -2,17 +2,38 @@
 //! such as glossy reflection plug into.
 //!
 //! The steps and their names are those of Stamminger et al., "Efficient Glossy Global Illumination with
-//! Interactive Viewing", Computer Graphics Forum 19(1), 2000.
+//! Interactive Viewing", Computer Graphics Forum 19(1), 2000. The way of the light through the modules:
+//! [`scene`] → [`hierarchy`] → ([`oracle`] → refinement → [`links`], with [`form_factor`] and [`visibility`]) →
+//! gather → push → [`hooks`]' reflect → pull ([`solver`]) → [`reconstruct`] → [`solution`].
 
 pub mod cone;
+pub mod error;
+pub mod form_factor;
 pub mod geometry;
+pub mod hierarchy;
 pub mod hooks;
+pub mod links;
+pub mod oracle;
+pub mod reconstruct;
+mod refine;
+pub mod sampling;
 pub mod scene;
+mod segments;
+pub mod solution;
+pub mod solver;
+pub mod stats;
+pub mod transport;
 pub mod visibility;
 
 pub use cone::Cone;
+pub use error::SolveError;
+pub use geometry::{Aabb, Domain, Geometry, GeometryError, Normalization};
 pub use hooks::{Hierarchy, LightField, NodeId, Transfer};
-pub use scene::{DiffuseMaterial, Light, LightKind, SceneInput, Shape, Surface};
+pub use scene::{DiffuseMaterial, Light, LightKind, SceneInput, Shape, Surface, SurfaceReflectance};
+pub use solution::Solution;
+pub use solver::{Phase, Progress, Settings, Solver};
+pub use stats::Stats;
+pub use visibility::{Hit, Visibility};
 
 /// A linear RGB triple: reflectance, radiosity, irradiance (W/m²) or radiance (W/(m² sr)), as its context says.
 pub type Rgb = glam::Vec3;

@@ -1,7 +1,8 @@
 //! What a caller hands in: surfaces in the scene's own units, their diffuse materials, and lights without extent.
 
 use crate::Rgb;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+use std::sync::Arc;
 
 /// A geometric primitive in scene units. Curved ones stay curved: nothing is tessellated before it is needed.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,7 +67,12 @@ impl Surface {
     /// A surface with its front as the shape has it and without shading normals.
     #[must_use]
     pub fn new(shape: Shape, material: u32) -> Self {
-        Self { shape, flip: false, material, shading_normals: None }
+        Self {
+            shape,
+            flip: false,
+            material,
+            shading_normals: None,
+        }
     }
 }
 
@@ -123,4 +129,13 @@ pub struct SceneInput {
     pub materials: Vec<DiffuseMaterial>,
     /// Lights without extent.
     pub lights: Vec<Light>,
+    /// Reflectance that varies over surfaces, where any does.
+    pub texture: Option<Arc<dyn SurfaceReflectance>>,
+}
+
+/// Diffuse reflectance that varies over a surface: textures, vertex colours.
+pub trait SurfaceReflectance: std::fmt::Debug + Send + Sync {
+    /// Mean diffuse reflectance over the polygon with these corners in the surface's (u, v), or `None` where the
+    /// material's own applies.
+    fn mean(&self, surface: u32, corners: &[Vec2]) -> Option<Rgb>;
 }

@@ -1,1 +1,424 @@
 //! Visibility by rays: occlusion of segments and closest hits, over an obvhs tree.
+//!
+//! The tree is obvhs's binary one, collapsed to nodes of four children whose boxes are tested side by side. Leaves
+//! hold the outlines of polygons, which is all that a test needs; curved surfaces are tested in f64 through their
+//! [`Geometry`]. No ray allocates, and every query is a pure function: results do not depend on the thread.
+
+use crate::geometry::{Aabb, Geometry, Outline};
+use glam::{Vec2, Vec3, Vec3A, Vec4};
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ploc::{PlocSearchDistance, SortPrecision};
+use obvhs::{Boundable, BvhBuildParams};
+use smallvec::SmallVec;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// What an end of a segment may touch without being blocked, in unit space: surfaces that abut there. Positions are
+/// rounded to some 2e-7 (twice, on either side), which grazing angles stretch; 1e-5 allows for 2°.
+const END_TRIM: f32 = 1e-5;
+
+/// The trim of a segment shorter than [`END_TRIM`]/this is this share of its length, but at least
+/// [`Aabb::ROUNDING`]: what stands between two near patches must still block.
+const END_TRIM_SHARE: f32 = 1e-3;
+
+/// Growth of a box's far distance that makes the slab test conservative: three roundings on each side (Ize, "Robust
+/// BVH Ray Traversal", JCGT 2(2), 2013), generously.
+const SLAB_GROWTH: f32 = 1.0 + 8.0 * f32::EPSILON;
+
+/// In place of a zero direction component: small enough to be parallel, large enough for a finite reciprocal.
+const PARALLEL: f32 = 1e-30;
+
+/// The "no blocker yet" value of the cache that [`Visibility::occluded`] keeps.
+pub const NO_BLOCKER: u32 = u32::MAX;
+
+/// Marks a child of a node as a leaf.
+const LEAF: u32 = 1 << 31;
+
+/// Where a ray meets the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Index of the surface.
+    pub surface: u32,
+    /// Distance in multiples of the ray's direction.
+    pub t: f32,
+    /// Parameters on the surface.
+    pub uv: Vec2,
+    /// The surface's point at `uv`.
+    pub point: Vec3,
+    /// Unit normal on the surface's front at `uv`, whichever side was hit.
+    pub normal: Vec3,
+    /// Whether the front was hit.
+    pub front: bool,
+}
+
+/// Four boxes side by side: lows and highs of x, y, z alternating, so that a direction's sign picks near and far.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: [Vec4; 6],
+    /// Index of a node, or [`LEAF`] | index of a leaf.
+    children: [u32; 4],
+}
+
+impl Node {
+    /// Empty boxes are hit by no ray.
+    const EMPTY: Self = {
+        let (low, high) = (Vec4::INFINITY, Vec4::NEG_INFINITY);
+        Self { bounds: [low, high, low, high, low, high], children: [0; 4] }
+    };
+}
+
+/// A run of primitives.
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    first: u32,
+    count: u32,
+}
+
+/// One surface as the tree's leaves hold it.
+#[derive(Clone, Copy, Debug)]
+enum Primitive {
+    Polygon(Outline),
+    Curved,
+}
+
+/// A ray with what slab tests need.
+struct Ray {
+    origin: Vec3,
+    direction: Vec3,
+    origins: [Vec4; 3],
+    reciprocals: [Vec4; 3],
+    /// Index of the near bound in [`Node::bounds`], by axis.
+    near: [usize; 3],
+}
+
+impl Ray {
+    fn new(origin: Vec3, direction: Vec3) -> Self {
+        let reciprocal = direction.map(|d| if d.abs() < PARALLEL { PARALLEL.copysign(d) } else { d }.recip());
+        let axis = |i: usize| 2 * i + usize::from(reciprocal[i] < 0.0);
+        Self {
+            origin,
+            direction,
+            origins: [0, 1, 2].map(|i| Vec4::splat(origin[i])),
+            reciprocals: [0, 1, 2].map(|i| Vec4::splat(reciprocal[i])),
+            near: [axis(0), axis(1), axis(2)],
+        }
+    }
+
+    /// Where the ray enters each of a node's boxes, and which of them it meets between `t_min` and `t_max`.
+    #[inline]
+    fn enter(&self, node: &Node, t_min: f32, t_max: f32) -> (Vec4, u32) {
+        let [x, y, z] = self.near;
+        let slab = |bound: usize, axis: usize| (node.bounds[bound] - self.origins[axis]) * self.reciprocals[axis];
+        let near = slab(x, 0).max(slab(y, 1)).max(slab(z, 2)).max(Vec4::splat(t_min));
+        let far = slab(x ^ 1, 0).min(slab(y ^ 1, 1)).min(slab(z ^ 1, 2)) * SLAB_GROWTH;
+        (near, near.cmple(far.min(Vec4::splat(t_max))).bitmask())
+    }
+}
+
+/// Answers ray queries over all surfaces of a scene.
+#[derive(Clone, Debug)]
+pub struct Visibility {
+    geometries: Vec<Geometry>,
+    nodes: Vec<Node>,
+    leaves: Vec<Leaf>,
+    primitives: Vec<Primitive>,
+    /// Surface of each primitive.
+    surfaces: Vec<u32>,
+    /// Primitive of each surface.
+    primitive_of: Vec<u32>,
+}
+
+impl Visibility {
+    /// Builds the tree. Surface ids are indices into `geometries`.
+    #[must_use]
+    pub fn new(geometries: &[Geometry]) -> Self {
+        let groups = Groups::new(geometries);
+        let bvh = groups.tree();
+        let mut visibility = Self {
+            geometries: geometries.to_vec(),
+            nodes: Vec::new(),
+            leaves: Vec::new(),
+            primitives: Vec::with_capacity(geometries.len()),
+            surfaces: Vec::with_capacity(geometries.len()),
+            primitive_of: vec![0; geometries.len()],
+        };
+        if !bvh.nodes.is_empty() {
+            visibility.collapse(&bvh, &groups);
+        }
+        visibility
+    }
+
+    /// The surfaces, by id.
+    #[must_use]
+    pub fn geometries(&self) -> &[Geometry] {
+        &self.geometries
+    }
+
+    /// Whether the open segment between two points is blocked.
+    ///
+    /// `skip` are the surfaces of the two ends ([`NO_BLOCKER`] for none): a flat one cannot block its own points and
+    /// is never tested; a curved one can, at a distance from the end that rounding does not explain. Other surfaces
+    /// block unless they touch the very end (1e-5 in unit space, less for short segments). `cache` holds the
+    /// surface that blocked last, [`NO_BLOCKER`] at first: it is tested first and changes only the time taken.
+    /// Segments without length and with non-finite ends are free.
+    #[must_use]
+    pub fn occluded(&self, from: Vec3, to: Vec3, skip: [u32; 2], cache: &mut u32) -> bool {
+        let direction = to - from;
+        let length = direction.length();
+        if !(length > 0.0 && length.is_finite()) {
+            return false;
+        }
+        let trim = (END_TRIM_SHARE * length).clamp(Aabb::ROUNDING, END_TRIM) / length;
+        let (t_min, t_max) = (trim, 1.0 - trim);
+        if t_min >= t_max {
+            return false;
+        }
+        let blocks = |surface: u32, primitive: &Primitive| match primitive {
+            Primitive::Polygon(outline) => {
+                surface != skip[0] && surface != skip[1] && outline.intersect(from, direction, t_min, t_max).is_some()
+            }
+            Primitive::Curved => self.curved_blocks(surface, from, direction, length, [t_min, t_max], skip),
+        };
+        if let Some(&primitive) = self.primitive_of.get(*cache as usize)
+            && blocks(*cache, &self.primitives[primitive as usize])
+        {
+            return true;
+        }
+        let ray = Ray::new(from, direction);
+        let mut stack: SmallVec<[u32; 64]> = SmallVec::new();
+        if !self.nodes.is_empty() {
+            stack.push(0);
+        }
+        while let Some(index) = stack.pop() {
+            if index & LEAF == 0 {
+                let node = &self.nodes[index as usize];
+                let (_, mut mask) = ray.enter(node, t_min, t_max);
+                while mask != 0 {
+                    stack.push(node.children[mask.trailing_zeros() as usize & 3]);
+                    mask &= mask - 1;
+                }
+                continue;
+            }
+            let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
+            for i in first as usize..(first + count) as usize {
+                let surface = self.surfaces[i];
+                if blocks(surface, &self.primitives[i]) {
+                    *cache = surface;
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// Whether a surface that is no polygon blocks a segment, with its own ends taken into account.
+    #[cold]
+    fn curved_blocks(
+        &self,
+        surface: u32,
+        from: Vec3,
+        direction: Vec3,
+        length: f32,
+        [mut t_min, mut t_max]: [f32; 2],
+        skip: [u32; 2],
+    ) -> bool {
+        let geometry = &self.geometries[surface as usize];
+        if skip.contains(&surface) {
+            if geometry.is_flat() {
+                return false;
+            }
+            let gap = geometry.self_gap() / length;
+            if surface == skip[0] {
+                t_min = t_min.max(gap);
+            }
+            if surface == skip[1] {
+                t_max = t_max.min(1.0 - gap);
+            }
+        }
+        geometry.intersect(from, direction, t_min, t_max).is_some()
+    }
+
+    /// The nearest surface that a ray meets, from either side, with `t_min` < t < `t_max` in multiples of
+    /// `direction` (of any length).
+    #[must_use]
+    pub fn closest(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<Hit> {
+        self.closest_except(origin, direction, t_min, t_max, NO_BLOCKER)
+    }
+
+    /// As [`closest`](Self::closest), for a ray that starts on the surface `own`: a flat one is not tested, a curved
+    /// one not within the distance that rounding explains.
+    #[must_use]
+    pub fn closest_except(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, own: u32) -> Option<Hit> {
+        let length = direction.length();
+        if !(length > 0.0 && length.is_finite() && origin.is_finite()) || self.nodes.is_empty() {
+            return None;
+        }
+        let ray = Ray::new(origin, direction);
+        let mut best = (t_max, None);
+        let mut stack: SmallVec<[(u32, f32); 64]> = SmallVec::new();
+        stack.push((0, t_min));
+        while let Some((index, entry)) = stack.pop() {
+            if entry > best.0 {
+                continue;
+            }
+            if index & LEAF == 0 {
+                let node = &self.nodes[index as usize];
+                let (near, mut mask) = ray.enter(node, t_min, best.0);
+                let base = stack.len();
+                while mask != 0 {
+                    let child = mask.trailing_zeros() as usize & 3;
+                    mask &= mask - 1;
+                    // The nearest last, to be popped first.
+                    let at = stack[base..].iter().position(|&(_, t)| t < near[child]).unwrap_or(stack.len() - base);
+                    stack.insert(base + at, (node.children[child], near[child]));
+                }
+                continue;
+            }
+            let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
+            for i in first as usize..(first + count) as usize {
+                let surface = self.surfaces[i];
+                let t = match &self.primitives[i] {
+                    Primitive::Polygon(_) if surface == own => None,
+                    Primitive::Polygon(outline) => outline.intersect(ray.origin, ray.direction, t_min, best.0),
+                    Primitive::Curved => {
+                        let geometry = &self.geometries[surface as usize];
+                        let gap = if surface == own { geometry.self_gap() / length } else { 0.0 };
+                        if surface == own && geometry.is_flat() {
+                            None
+                        } else {
+                            geometry.intersect(ray.origin, ray.direction, t_min.max(gap), best.0).map(|hit| hit.0)
+                        }
+                    }
+                };
+                if let Some(t) = t {
+                    best = (t, Some(surface));
+                }
+            }
+        }
+        let (t, surface) = (best.0, best.1?);
+        let geometry = &self.geometries[surface as usize];
+        let uv = geometry.parameters_of(origin + direction * t);
+        let normal = geometry.normal(uv);
+        Some(Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 })
+    }
+
+    /// Turns the binary tree into nodes of four children, parents before children.
+    fn collapse(&mut self, bvh: &Bvh2, groups: &Groups) {
+        // Nodes still to be filled, with the binary node that each stands for.
+        let mut pending = vec![(0, 0)];
+        self.nodes.push(Node::EMPTY);
+        while let Some((target, source)) = pending.pop() {
+            let mut children: SmallVec<[usize; 4]> = SmallVec::new();
+            children.push(source);
+            // The largest inner child gives way to its own children while there is room.
+            while children.len() < 4 {
+                let largest = (0..children.len())
+                    .filter(|&i| !bvh.nodes[children[i]].is_leaf())
+                    .max_by(|&a, &b| half_area(bvh, children[a]).total_cmp(&half_area(bvh, children[b])));
+                let Some(i) = largest else { break };
+                let first = bvh.nodes[children[i]].first_index as usize;
+                children[i] = first;
+                children.push(first + 1);
+            }
+            for (i, &child) in children.iter().enumerate() {
+                let node = &bvh.nodes[child];
+                for axis in 0..3 {
+                    self.nodes[target].bounds[2 * axis][i] = node.aabb().min[axis];
+                    self.nodes[target].bounds[2 * axis + 1][i] = node.aabb().max[axis];
+                }
+                self.nodes[target].children[i] = if node.is_leaf() {
+                    let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+                    LEAF | self.push_leaf(bvh.primitive_indices[range].iter().map(|&g| groups.members(g)))
+                } else {
+                    let index = self.nodes.len();
+                    self.nodes.push(Node::EMPTY);
+                    pending.push((index, child));
+                    index as u32
+                };
+            }
+        }
+    }
+
+    /// Lays out the surfaces of a leaf in a row and returns its index.
+    fn push_leaf<'a>(&mut self, groups: impl Iterator<Item = &'a [u32]>) -> u32 {
+        let first = self.primitives.len() as u32;
+        for &surface in groups.flatten() {
+            self.primitive_of[surface as usize] = self.primitives.len() as u32;
+            self.surfaces.push(surface);
+            self.primitives.push(match &self.geometries[surface as usize] {
+                Geometry::Triangle(triangle) => Primitive::Polygon(triangle.outline()),
+                Geometry::Quad(quad) => Primitive::Polygon(quad.outline()),
+                Geometry::Revolution(_) => Primitive::Curved,
+            });
+        }
+        self.leaves.push(Leaf { first, count: self.primitives.len() as u32 - first });
+        self.leaves.len() as u32 - 1
+    }
+}
+
+/// Half the surface area of a node's box.
+fn half_area(bvh: &Bvh2, node: usize) -> f32 {
+    bvh.nodes[node].aabb().half_area()
+}
+
+/// Surfaces with the same box count as one when the tree is built: the two halves of a rectangle, and stacks of
+/// coinciding surfaces, which would make the build quadratic.
+struct Groups {
+    boxes: Vec<GroupBox>,
+    /// Surfaces, group by group.
+    surfaces: Vec<u32>,
+    /// Where each group begins, and the end of the last.
+    starts: Vec<usize>,
+}
+
+/// The box of a group, as obvhs wants it.
+struct GroupBox(Aabb);
+
+impl Boundable for GroupBox {
+    fn aabb(&self) -> obvhs::aabb::Aabb {
+        obvhs::aabb::Aabb::new(Vec3A::from(self.0.min), Vec3A::from(self.0.max))
+    }
+}
+
+impl Groups {
+    fn new(geometries: &[Geometry]) -> Self {
+        // In order of the boxes' bits: no hashing, thus the same tree every time.
+        let mut groups: BTreeMap<[u32; 6], (Aabb, Vec<u32>)> = BTreeMap::new();
+        for (surface, geometry) in geometries.iter().enumerate() {
+            let bounds = geometry.bounds(crate::geometry::Domain::WHOLE);
+            let [a, b, c] = bounds.min.to_array().map(f32::to_bits);
+            let [d, e, f] = bounds.max.to_array().map(f32::to_bits);
+            groups.entry([a, b, c, d, e, f]).or_insert((bounds, Vec::new())).1.push(surface as u32);
+        }
+        let mut result = Self { boxes: Vec::new(), surfaces: Vec::new(), starts: vec![0] };
+        for (bounds, members) in groups.into_values() {
+            result.boxes.push(GroupBox(bounds));
+            result.surfaces.extend(members);
+            result.starts.push(result.surfaces.len());
+        }
+        result
+    }
+
+    fn members(&self, group: u32) -> &[u32] {
+        &self.surfaces[self.starts[group as usize]..self.starts[group as usize + 1]]
+    }
+
+    fn tree(&self) -> Bvh2 {
+        let parameters = BvhBuildParams {
+            pre_split: false,
+            ploc_search_distance: PlocSearchDistance::High,
+            // Above 0 the lowest levels are paired hastily, which costs large scenes a factor in every ray.
+            search_depth_threshold: 0,
+            reinsertion_batch_ratio: 0.2,
+            post_collapse_reinsertion_batch_ratio_multiplier: 2.0,
+            sort_precision: SortPrecision::U64,
+            max_prims_per_leaf: 4,
+            collapse_traversal_cost: 1.5,
+        };
+        build_bvh2(&self.boxes, parameters, &mut Duration::default())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -2,15 +2,28 @@
 
 pub mod builtin;
 pub mod camera;
+pub mod color;
 pub mod error;
+mod finish;
 pub mod gltf_file;
 pub mod image_file;
+mod mesh;
 pub mod mgf;
 pub mod obj_file;
+mod reflectors;
 pub mod scene;
+#[cfg(test)]
+mod testing;
+pub mod texture;
 pub mod tonemap;
+mod viewpoint;
+mod warnings;
+pub mod whole_file;
 
 pub use camera::Camera;
 pub use error::SceneError;
-// pub use image_file::Image;
-pub use scene::{Material, Primaries, Scene, SurfaceAttributes, Texture, Warning};
+pub use glossy_ext::Rgb;
+pub use image_file::{Image, ImageKind};
+pub use scene::{Material, Primaries, Scene, Warning};
+pub use texture::{SurfaceAttributes, Texels, Texture, Wrap};
+pub use tonemap::{Exposure, ToneMap};

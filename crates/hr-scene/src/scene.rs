@@ -1,9 +1,11 @@
 //! A loaded scene: surfaces for the light transport, materials and textures for the eye, cameras, warnings.
 
-use crate::Camera;
-use glam::{Mat3, Vec2};
+use crate::texture::{SurfaceAttributes, Texture};
+use crate::{Camera, SceneError, builtin, gltf_file, mgf, obj_file};
 use glossy_ext::{Reflector, Rgb};
-use hr_diffuse::{Light, Surface};
+use glam::Vec2;
+use hr_diffuse::{DiffuseMaterial, Light, SceneInput, Surface, SurfaceReflectance};
+use std::path::Path;
 use std::sync::Arc;
 
 /// The RGB primaries of a scene's colours; both have a white that keeps grey at (1, 1, 1).
@@ -29,54 +31,8 @@ pub struct Material {
     pub two_sided: bool,
     /// Base colour texture and the factor that multiplies it.
     pub texture: Option<Texture>,
-    /// Linear base colour factor that textures and vertex colours multiply; white where neither is used.
+    /// Linear base colour factor that textures and vertex colours multiply; not looked at where neither is there.
     pub base_color: Rgb,
-}
-
-/// A base colour texture.
-#[derive(Clone, Debug)]
-pub struct Texture {
-    /// Linear RGB texels, row 0 first, shared among materials.
-    pub texels: Arc<Texels>,
-    /// Transform of texture coordinates (`KHR_texture_transform`), applied before wrapping.
-    pub transform: Mat3,
-    /// What happens outside 0…1 in u and v.
-    pub wrap: [Wrap; 2],
-}
-
-/// Texels in linear RGB.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Texels {
-    /// Width in texels, ≥ 1.
-    pub width: u32,
-    /// Height in texels, ≥ 1.
-    pub height: u32,
-    /// `width · height` linear colours, row 0 first.
-    pub data: Vec<Rgb>,
-}
-
-/// What a texture does outside 0…1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Wrap {
-    /// Starts anew.
-    #[default]
-    Repeat,
-    /// Starts anew, every second time mirrored.
-    Mirror,
-    /// Keeps the colour of the border.
-    Clamp,
-}
-
-/// What varies over a surface beside its geometry, for textured or vertex-coloured surfaces only. Corners as in
-/// the surface's shape.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfaceAttributes {
-    /// Index of the surface in [`Scene::surfaces`].
-    pub surface: u32,
-    /// Texture coordinates at the corners.
-    pub uv: [Vec2; 4],
-    /// Linear vertex colours at the corners.
-    pub color: [Rgb; 4],
 }
 
 /// Something that was mended or left out while loading.
@@ -109,4 +65,97 @@ pub struct Scene {
     pub primaries: Primaries,
     /// What was mended or left out.
     pub warnings: Vec<Warning>,
+}
+
+impl Scene {
+    /// Loads a scene file by its extension (`.mgf`, `.gltf`, `.glb`, `.obj`, in capitals or not), or makes the
+    /// [built-in scene](builtin) of that name, and [finishes](Self::finish) it.
+    ///
+    /// # Errors
+    /// [`SceneError::Unknown`] for a name that is neither; else what the reader of the file or
+    /// [`finish`](Self::finish) says.
+    pub fn load(name_or_path: &str) -> Result<Self, SceneError> {
+        let path = Path::new(name_or_path);
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let scene = match extension.as_str() {
+            "mgf" => mgf::load(path)?,
+            "gltf" | "glb" => gltf_file::load(path)?,
+            "obj" => obj_file::load(path)?,
+            _ => builtin::scene(name_or_path).ok_or_else(|| SceneError::Unknown {
+                name: name_or_path.to_owned(),
+                known: builtin::NAMES.join(", "),
+            })?,
+        };
+        scene.finish()
+    }
+
+    /// What the diffuse engine needs of this scene: its surfaces and lights, of each material the Lambertian share,
+    /// and where base colours vary over surfaces their mean over any part of one.
+    #[must_use]
+    pub fn input(self: &Arc<Self>) -> SceneInput {
+        let diffuse = |m: &Material| DiffuseMaterial {
+            reflectance: m.reflector.diffuse(),
+            exitance: m.exitance,
+            two_sided: m.two_sided,
+        };
+        SceneInput {
+            surfaces: self.surfaces.clone(),
+            materials: self.materials.iter().map(diffuse).collect(),
+            lights: self.lights.clone(),
+            texture: (!self.attributes.is_empty()).then(|| Arc::clone(self) as Arc<dyn SurfaceReflectance>),
+        }
+    }
+
+    /// The reflectors of all materials, in order.
+    #[must_use]
+    pub fn reflectors(&self) -> Vec<Arc<dyn Reflector>> {
+        self.materials.iter().map(|m| Arc::clone(&m.reflector)).collect()
+    }
+
+    /// Lambertian share of a surface's reflector with another base colour.
+    #[must_use]
+    pub fn diffuse_of(&self, surface: u32, base_color: Rgb) -> Rgb {
+        let reflector = &self.materials[self.surfaces[surface as usize].material as usize].reflector;
+        reflector.with_base_color(base_color).map_or_else(|| reflector.diffuse(), |r| r.diffuse())
+    }
+}
+
+impl SurfaceReflectance for Scene {
+    fn mean(&self, surface: u32, corners: &[Vec2]) -> Option<Rgb> {
+        self.mean_base_color(surface, corners).map(|color| self.diffuse_of(surface, color))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknown_names_list_the_known_ones() {
+        for name in ["", "rooom", "scene.blend", "no/such/folder", "room.png"] {
+            let error = Scene::load(name).expect_err("unknown");
+            assert!(matches!(error, SceneError::Unknown { .. }), "{name}: {error}");
+            let text = error.to_string();
+            assert!(text.contains(&format!("'{name}'")) && text.contains("room, three-lights"), "{text}");
+        }
+    }
+
+    #[test]
+    fn missing_files_are_named() {
+        for name in ["no-such.mgf", "no-such.GLTF", "no-such.glb", "no-such.obj"] {
+            let error = Scene::load(name).expect_err("there is no such file").to_string();
+            assert!(error.contains(name), "{error}");
+        }
+    }
+
+    #[test]
+    fn input_has_the_lambertian_share() {
+        let scene = Arc::new(Scene::load("furnace").expect("built in"));
+        let input = scene.input();
+        assert_eq!(input.surfaces, scene.surfaces, "all surfaces");
+        let [wall] = input.materials[..] else { panic!("one material: {:?}", input.materials) };
+        assert_eq!(wall.reflectance, Rgb::new(0.2, 0.5, 0.8), "reflectance");
+        assert_eq!(wall.exitance, Rgb::new(1.0, 2.0, 3.0), "exitance");
+        assert!(wall.two_sided, "sides");
+    }
 }

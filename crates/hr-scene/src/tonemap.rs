@@ -1,1 +1,233 @@
-//! (in the making)
+//! From radiance to what a screen shows: exposure, a filmic curve, sRGB.
+
+use crate::{Primaries, Rgb};
+use glam::{DMat3, DVec3};
+
+/// Exposed luminance of a picture's middle: what the [curve](filmic) prints as 18 % grey.
+const KEY: f64 = 0.130;
+
+/// Shares of the pixels, by luminance, that automatic exposure looks at: neither deep shadow nor lamps and windows,
+/// which would otherwise pull the whole picture up or down.
+const MIDDLE: (f64, f64) = (0.05, 0.90);
+
+/// Exposed values are cut here. The curve is white from 7.3 on, so this only keeps its squares from overflowing.
+const BRIGHTEST: f64 = 1e6;
+
+/// How bright a picture is printed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Exposure {
+    /// From the picture itself: its log-average luminance, darkest 5 % and brightest 10 % left out, becomes middle grey.
+    #[default]
+    Auto,
+    /// Radiance is multiplied by this factor (≥ 0); 1 prints a radiance of about 0.13 W/(m² sr) as middle grey.
+    Factor(f32),
+}
+
+/// How radiance becomes colours on the screen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ToneMap {
+    /// How bright.
+    pub exposure: Exposure,
+    /// Stops (factors of two) on top of `exposure`; 0 changes nothing.
+    pub stops: f32,
+}
+
+impl ToneMap {
+    /// The factor that pixels are to be multiplied by; finite, ≥ 0 and the same for the same pixels. For a sequence of
+    /// pictures, take it from one of them and use [`Exposure::Factor`], so that they do not flicker.
+    #[must_use]
+    pub fn factor(&self, pixels: &[Rgb], primaries: Primaries) -> f32 {
+        let base = match self.exposure {
+            Exposure::Auto => KEY / middle_luminance(pixels, primaries).unwrap_or(KEY),
+            Exposure::Factor(factor) => f64::from(factor),
+        };
+        let factor = base * f64::from(self.stops).exp2();
+        if factor.is_nan() { 1.0 } else { factor.clamp(0.0, f64::from(f32::MAX)) as f32 }
+    }
+
+    /// Everything decided: turns single pixels of this picture into screen colours.
+    #[must_use]
+    pub fn print(&self, pixels: &[Rgb], primaries: Primaries) -> Print {
+        let factor = f64::from(self.factor(pixels, primaries));
+        Print { to_srgb: primaries.to_srgb(), factor }
+    }
+}
+
+/// A tone map with its exposure settled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Print {
+    to_srgb: DMat3,
+    factor: f64,
+}
+
+impl Print {
+    /// Radiance to linear sRGB (Rec. 709), each channel 0…1. Not-a-number is black, infinity white.
+    #[must_use]
+    pub fn linear(&self, radiance: Rgb) -> Rgb {
+        let finite = radiance.to_array().map(|v| if v.is_nan() { 0.0 } else { v.clamp(f32::MIN, f32::MAX) });
+        // Cut on both sides of the matrix: before it nothing may overflow, after it no negative channel may remain.
+        let exposed = (Rgb::from(finite).as_dvec3() * self.factor).clamp(DVec3::ZERO, DVec3::splat(BRIGHTEST));
+        (self.to_srgb * exposed).to_array().map(|v| filmic(v) as f32).into()
+    }
+
+    /// Radiance to 8-bit sRGB.
+    #[must_use]
+    pub fn srgb8(&self, radiance: Rgb) -> [u8; 3] {
+        self.linear(radiance).to_array().map(|v| (255.0 * srgb_transfer(v.into())).round() as u8)
+    }
+}
+
+/// The filmic curve: a toe that deepens shadows, a shoulder that rolls highlights off; 0 → 0, ≥ 7.3 → 1, rising in
+/// between. Below 0 it is 0.
+///
+/// K. Narkowicz, "ACES Filmic Tone Mapping Curve", 2016: a fit to the ACES reference rendering transform.
+#[must_use]
+pub fn filmic(x: f64) -> f64 {
+    let x = x.clamp(0.0, 2.0 * BRIGHTEST);
+    ((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0)
+}
+
+/// The sRGB transfer function (IEC 61966-2-1) of a linear value in 0…1.
+#[must_use]
+pub fn srgb_transfer(linear: f64) -> f64 {
+    let v = linear.clamp(0.0, 1.0);
+    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Geometric mean of the [`MIDDLE`] luminances; pixels that are black or not finite do not count. `None` where no pixel
+/// is left.
+fn middle_luminance(pixels: &[Rgb], primaries: Primaries) -> Option<f64> {
+    // A histogram over the exponents of f32 with 16 bins a stop: linear time, and the order of pixels hardly matters.
+    const BINS_PER_STOP: f64 = 16.0;
+    const DARKEST: f64 = -150.0;
+    const BINS: usize = (280.0 * BINS_PER_STOP) as usize;
+    let weights = primaries.luminance_weights();
+    let mut bins = vec![0_u64; BINS];
+    let mut total = 0_u64;
+    for pixel in pixels {
+        let luminance = pixel.as_dvec3().dot(weights);
+        if luminance > 0.0 && luminance.is_finite() {
+            let bin = (luminance.log2() - DARKEST) * BINS_PER_STOP;
+            bins[(bin.max(0.0) as usize).min(BINS - 1)] += 1;
+            total += 1;
+        }
+    }
+    let (low, high) = (total as f64 * MIDDLE.0, total as f64 * MIDDLE.1);
+    let (mut sum, mut weight, mut below) = (0.0, 0.0, 0.0);
+    for (k, &count) in bins.iter().enumerate().filter(|(_, count)| **count > 0) {
+        // The part of this bin's pixels that lies between the two shares.
+        let above = below + count as f64;
+        let part = (above.min(high) - below.max(low)).max(0.0);
+        sum += part * (DARKEST + (k as f64 + 0.5) / BINS_PER_STOP);
+        weight += part;
+        below = above;
+    }
+    (weight > 0.0).then(|| (sum / weight).exp2())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn greys(values: &[f32]) -> Vec<Rgb> {
+        values.iter().map(|&v| Rgb::splat(v)).collect()
+    }
+
+    #[test]
+    fn curve_rises_from_black_to_white() {
+        assert_eq!(filmic(0.0), 0.0, "black");
+        assert_eq!(filmic(7.3), 1.0, "white point");
+        assert!((filmic(KEY) - 0.18).abs() < 5e-4, "the key is middle grey");
+        let mut last = 0.0;
+        for k in 1..3000 {
+            let y = filmic(f64::from(k) * 0.0024);
+            assert!(y > last, "strictly rising below the white point, at {k}");
+            last = y;
+        }
+        assert_eq!(filmic(f64::INFINITY), 1.0, "no overflow");
+        assert_eq!(filmic(-1.0), 0.0, "no negative light");
+    }
+
+    #[test]
+    fn print_is_monotone_and_keeps_grey() {
+        for primaries in [Primaries::Radiance, Primaries::Rec709] {
+            let print = ToneMap { exposure: Exposure::Factor(1.0), stops: 0.0 }.print(&[], primaries);
+            let mut last = 0;
+            for k in 0..=2000 {
+                let [r, g, b] = print.srgb8(Rgb::splat(k as f32 * 0.004));
+                assert!(r == g && g == b, "{primaries:?}: grey stays grey at {k}: {r} {g} {b}");
+                assert!(r >= last, "{primaries:?}: monotone at {k}");
+                last = r;
+            }
+            assert_eq!(last, 255, "{primaries:?}: ends in white");
+        }
+    }
+
+    #[test]
+    fn automatic_exposure_scales_with_the_light() {
+        let dim: Vec<_> = (1..400).map(|k| Rgb::new(k as f32, 0.7 * k as f32, 0.3 * k as f32) * 1e-3).collect();
+        let map = ToneMap::default();
+        let expected = map.factor(&dim, Primaries::Radiance);
+        for scale in [1e-30_f32, 1e-6, 3.0, 1e6, 1e30] {
+            let lit: Vec<_> = dim.iter().map(|p| *p * scale).collect();
+            let ratio = map.factor(&lit, Primaries::Radiance) * scale / expected;
+            // A pixel moves by at most one bin of 1/16 stop: 2^(1/16) = 1.044.
+            assert!((0.957..1.045).contains(&ratio), "light times {scale:e}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn lamps_and_night_do_not_dominate() {
+        let mut values = vec![1.0_f32; 900];
+        let map = ToneMap::default();
+        let plain = map.factor(&greys(&values), Primaries::Radiance);
+        assert!((plain - KEY as f32).abs() < 0.05 * KEY as f32, "grey 1 is exposed to the key: {plain}");
+        values.extend([1e5; 60]);
+        values.extend([0.0; 500]);
+        values.extend([f32::NAN, f32::INFINITY]);
+        let lit = map.factor(&greys(&values), Primaries::Radiance);
+        assert!((lit / plain - 1.0).abs() < 1e-6, "lamps and black background change nothing: {lit} {plain}");
+    }
+
+    #[test]
+    fn every_input_gives_a_colour() {
+        let hard = [0.0, -1.0, 1e-45, f32::MIN_POSITIVE, 1.0, f32::MAX, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
+        let exposures = hard.map(Exposure::Factor);
+        let mut pictures: Vec<Vec<Rgb>> = hard.iter().map(|&v| greys(&[v])).collect();
+        pictures.push(vec![]);
+        pictures.push(greys(&hard));
+        for exposure in exposures.into_iter().chain([Exposure::Auto]) {
+            for stops in hard {
+                for pixels in &pictures {
+                    let print = ToneMap { exposure, stops }.print(pixels, Primaries::Radiance);
+                    for r in hard {
+                        let out = print.linear(Rgb::new(r, f32::MAX, 1.0));
+                        assert!(
+                            out.cmpge(Rgb::ZERO).all() && out.cmple(Rgb::ONE).all(),
+                            "{exposure:?} {stops} {pixels:?} {r}: {out}"
+                        );
+                    }
+                }
+            }
+        }
+        let black = ToneMap::default().print(&greys(&[0.0; 8]), Primaries::Radiance);
+        assert_eq!(black.srgb8(Rgb::ZERO), [0; 3], "a black picture is black");
+    }
+
+    #[test]
+    fn stops_are_factors_of_two() {
+        let pixels = greys(&[0.1, 0.4, 2.0]);
+        for exposure in [Exposure::Auto, Exposure::Factor(3.0)] {
+            let at = |stops| ToneMap { exposure, stops }.factor(&pixels, Primaries::Rec709);
+            assert_eq!(at(2.0), 4.0 * at(0.0), "{exposure:?}");
+        }
+    }
+
+    #[test]
+    fn transfer_is_srgb() {
+        // IEC 61966-2-1: 8-bit code 118 is middle grey 0.1812.
+        assert!((srgb_transfer(0.181_164_2) * 255.0 - 118.0).abs() < 1e-3, "middle grey");
+        assert_eq!(srgb_transfer(0.0), 0.0, "black");
+        assert!((srgb_transfer(1.0) - 1.0).abs() < 1e-12, "white");
+    }
+}

@@ -1,0 +1,209 @@
+//! The glossy light field: illumination samples in, directional distributions out, through the hooks alone.
+
+use crate::haar::{Beyond, Haar, Known, Peak, Refinement, Support};
+use crate::reflector::{Incident, Reflector, Ward};
+use crate::samples::{IlluminationSample, Place, SampleSet, arriving};
+use crate::Rgb;
+use glam::Vec3;
+use hr_diffuse::{Cone, Hierarchy, LightField, NodeId, Transfer};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// In light transport lobes are at least as wide as this makes them (standard deviation in radians, about 1.7°):
+/// what distributions of level 6 resolve. Narrower ones are followed by rays at display.
+const NARROWEST: f32 = 0.03;
+/// Slope of the lobe that stands for a perfect mirror in light transport.
+const MIRROR_ALPHA: f32 = 0.03;
+/// Of a leaf's samples, the directions of so many strongest ones are told to the projection as peaks.
+const PEAKS: usize = 12;
+
+/// How one material's light is transported.
+#[derive(Clone, Debug)]
+struct Material {
+    reflector: Arc<dyn Reflector>,
+    /// Stands for the perfect mirror that is part of the reflector.
+    mirror: Option<Ward>,
+    /// Largest channel of what is reflected beside the diffuse part.
+    albedo: f32,
+}
+
+/// Work counters.
+#[derive(Debug, Default)]
+pub struct Counters {
+    evaluations: AtomicU64,
+    samples: AtomicU64,
+}
+
+impl Counters {
+    /// BRDF evaluations so far: one per sample and direction.
+    #[must_use]
+    pub fn brdf_evaluations(&self) -> u64 {
+        self.evaluations.load(Ordering::Relaxed)
+    }
+
+    /// Samples reflected so far.
+    #[must_use]
+    pub fn samples_reflected(&self) -> u64 {
+        self.samples.load(Ordering::Relaxed)
+    }
+}
+
+/// Glossy reflection for an engine: implements its hooks.
+#[derive(Debug)]
+pub struct GlossyField {
+    /// `None`: the material is diffuse.
+    materials: Vec<Option<Material>>,
+    refinement: Refinement,
+    counters: Counters,
+}
+
+impl GlossyField {
+    /// For the materials of a scene, by index. Those whose reflector is diffuse take no part.
+    #[must_use]
+    pub fn new(reflectors: &[Arc<dyn Reflector>], refinement: Refinement) -> Self {
+        let materials = reflectors.iter().map(|reflector| {
+            (!reflector.is_diffuse()).then(|| {
+                let mirror = reflector.mirror();
+                Material {
+                    reflector: Arc::clone(reflector),
+                    mirror: (mirror.max_element() > 0.0)
+                        .then(|| Ward::new(Rgb::ZERO, mirror, MIRROR_ALPHA).ok())
+                        .flatten(),
+                    albedo: (reflector.glossy_albedo() + mirror).max_element().max(0.0),
+                }
+            })
+        });
+        Self { materials: materials.collect(), refinement, counters: Counters::default() }
+    }
+
+    /// Work done so far.
+    #[must_use]
+    pub fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    fn material(&self, material: Option<u32>) -> Option<&Material> {
+        self.materials.get(material? as usize)?.as_ref()
+    }
+
+    /// The reflector of a material that takes part.
+    #[must_use]
+    pub fn reflector(&self, material: u32) -> Option<&Arc<dyn Reflector>> {
+        self.material(Some(material)).map(|m| &m.reflector)
+    }
+}
+
+impl Material {
+    /// Light that a place sends toward a local direction, lobes widened to what transport resolves.
+    fn reflect(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
+        let mut light = self.reflector.reflect_sum(incident, outgoing);
+        if let Some(mirror) = &self.mirror {
+            light += mirror.reflect_sum(incident, outgoing);
+        }
+        light
+    }
+}
+
+/// The strongest of the lobes that the samples make, in world directions.
+fn peaks(material: &Material, incident: &[Incident], place: &Place) -> Vec<Peak> {
+    let mut strongest: Vec<&Incident> = incident.iter().filter(|i| i.direction.z > 0.05).collect();
+    let strength = |i: &Incident| i.irradiance.max_element() / (i.extent * i.extent + 1e-4);
+    strongest.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+    strongest.truncate(PEAKS);
+    strongest
+        .into_iter()
+        .map(|sample| {
+            // By reciprocity the lobe of the incident direction is where it is reflected to.
+            let lobe = material.reflector.lobe(sample.direction);
+            let (direction, width) = if material.mirror.is_some() {
+                (Vec3::new(-sample.direction.x, -sample.direction.y, sample.direction.z), MIRROR_ALPHA)
+            } else {
+                (lobe.direction, lobe.width)
+            };
+            Peak { direction: place.frame * direction, width: width.max(NARROWEST).max(sample.extent) }
+        })
+        .collect()
+}
+
+impl LightField for GlossyField {
+    type Incident = SampleSet;
+    type Exitant = Haar;
+
+    fn active(&self, material: u32) -> Option<f32> {
+        self.material(Some(material)).map(|m| m.albedo)
+    }
+
+    fn clear(&self, incident: &mut SampleSet) {
+        incident.clear();
+    }
+
+    fn receive(&self, incident: &mut SampleSet, transfer: &Transfer) {
+        incident.push(IlluminationSample::new(transfer));
+    }
+
+    fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], diffuse: Rgb) -> Haar {
+        let Some(material) = self.material(hierarchy.material(leaf)) else { return Haar::default() };
+        let place = Place::new(hierarchy.center(leaf), hierarchy.normals(leaf).axis);
+        let mut incident = Vec::new();
+        arriving(hierarchy, leaf, path, &place, &mut incident);
+        if incident.is_empty() {
+            return Haar::default();
+        }
+        for sample in &mut incident {
+            sample.extent = sample.extent.max(NARROWEST);
+        }
+        let flat = hierarchy.is_flat(leaf);
+        let known = Known {
+            support: Some(Support {
+                cone: Cone { axis: place.normal(), cos_angle: 1e-3 },
+                beyond: if flat { Beyond::Continued } else { Beyond::Zero },
+            }),
+            offset: diffuse,
+            peaks: &peaks(material, &incident, &place),
+        };
+        let projected = Haar::project(&self.refinement, &known, |direction| {
+            let outgoing = place.local(direction);
+            let radiance = material.reflect(&incident, outgoing);
+            // On elements that are not flat, intensity per area.
+            if flat { radiance } else { radiance * outgoing.z.max(0.0) }
+        });
+        let evaluations = projected.evaluations as u64 * incident.len() as u64;
+        self.counters.evaluations.fetch_add(evaluations, Ordering::Relaxed);
+        self.counters.samples.fetch_add(incident.len() as u64, Ordering::Relaxed);
+        projected.haar
+    }
+
+    fn pull<H: Hierarchy>(&self, hierarchy: &H, parent: NodeId, children: &[Haar]) -> Haar {
+        let nodes = hierarchy.children(parent);
+        let area: f32 = nodes.clone().map(|child| hierarchy.area(NodeId(child))).sum();
+        if area <= 0.0 {
+            return Haar::default();
+        }
+        let flat = hierarchy.is_flat(parent);
+        let oriented: Vec<(f32, std::borrow::Cow<'_, Haar>)> = nodes
+            .zip(children)
+            .filter(|(_, haar)| !haar.is_empty())
+            .map(|(child, haar)| {
+                let child = NodeId(child);
+                let share = hierarchy.area(child) / area;
+                if !flat && hierarchy.is_flat(child) {
+                    // Radiance of a plane becomes intensity per area.
+                    let normal = hierarchy.normals(child).axis;
+                    (share, std::borrow::Cow::Owned(haar.map(|d, value| value * d.dot(normal).max(0.0))))
+                } else {
+                    (share, std::borrow::Cow::Borrowed(haar))
+                }
+            })
+            .collect();
+        let weighted: Vec<(f32, &Haar)> = oriented.iter().map(|(share, haar)| (*share, haar.as_ref())).collect();
+        Haar::average(&weighted, &self.refinement, Rgb::ZERO)
+    }
+
+    fn radiance(&self, exitant: &Haar, away: Vec3) -> Rgb {
+        exitant.eval(away)
+    }
+
+    fn radiance_bounds(&self, exitant: &Haar, away: &Cone) -> (Rgb, Rgb) {
+        exitant.bounds(away)
+    }
+}

@@ -1,0 +1,184 @@
+//! Geometry of the triangles of the octahedron.
+//!
+//! A direction d is parametrised by the point p = d / (|x| + |y| + |z|) of the octahedron's surface. Triangles are
+//! subdivided at the midpoints of that *flat* surface: corners are dyadic fractions, exact in `f32`; finding the
+//! triangle of a direction takes only doublings of barycentric coordinates; and the solid angles of the triangles
+//! of one level differ by no more than the Jacobian 1/(√3 |p|³), a factor of 5.2 between a corner of the octahedron
+//! and the middle of a face.
+
+use glam::{DVec3, Vec3};
+use hr_diffuse::Cone;
+
+/// Which of (corner 0, 1, 2, midpoint of the edge opposite corner 0, 1, 2) are the corners of each child: three at
+/// the corners of the parent, then the one in the middle.
+pub(super) const CHILD_CORNERS: [[usize; 3]; 4] = [[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]];
+
+/// The two ends of the edge opposite each corner.
+pub(super) const EDGE_ENDS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+
+/// Picks the corners of a child from corners and midpoints, whatever is kept there.
+#[inline]
+pub(super) fn child_corners<T: Copy>(corners: [T; 3], mids: [T; 3], child: usize) -> [T; 3] {
+    let all = [
+        corners[0], corners[1], corners[2], mids[0], mids[1], mids[2],
+    ];
+    CHILD_CORNERS[child].map(|i| all[i])
+}
+
+/// Midpoints of the edges opposite each corner.
+#[inline]
+pub(super) fn midpoints(corners: [Vec3; 3]) -> [Vec3; 3] {
+    EDGE_ENDS.map(|[a, b]| 0.5 * corners[a] + 0.5 * corners[b])
+}
+
+/// Face of the octahedron by its signs (bit 0: x < 0, bit 1: y < 0, bit 2: z < 0) → its corners.
+pub(super) fn face_corners(face: usize) -> [Vec3; 3] {
+    let sign = |axis: usize| if face >> axis & 1 == 1 { -1.0 } else { 1.0 };
+    [Vec3::X * sign(0), Vec3::Y * sign(1), Vec3::Z * sign(2)]
+}
+
+/// A cone of directions made ready for many tests.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ConeTest {
+    axis: Vec3,
+    cos: f32,
+    sin: f32,
+}
+
+impl ConeTest {
+    /// Rounding of the dot and cross products of unit vectors in `f32`, several times over; tests err toward "touches".
+    const SLACK: f32 = 1e-6;
+
+    pub(super) fn new(cone: &Cone) -> Self {
+        let cos = cone.cos_angle.clamp(-1.0, 1.0);
+        Self {
+            axis: cone.axis,
+            cos,
+            sin: (1.0 - cos * cos).max(0.0).sqrt(),
+        }
+    }
+}
+
+/// A triangle on the octahedron's surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Triangle {
+    /// Corners on the octahedron (|x| + |y| + |z| = 1), not normalised.
+    pub(super) corners: [Vec3; 3],
+    /// Unit direction through the centroid.
+    center: Vec3,
+    /// Cosine and sine of the angle from there to the farthest corner.
+    cos: f32,
+    sin: f32,
+}
+
+impl Triangle {
+    pub(super) fn new(corners: [Vec3; 3]) -> Self {
+        let center = (corners[0] + corners[1] + corners[2]).normalize();
+        let cos = corners
+            .iter()
+            .map(|c| center.dot(*c) / c.length())
+            .fold(1.0, f32::min);
+        Self {
+            corners,
+            center,
+            cos,
+            sin: (1.0 - cos * cos).max(0.0).sqrt(),
+        }
+    }
+
+    pub(super) fn child(&self, child: usize) -> Self {
+        Self::new(child_corners(self.corners, midpoints(self.corners), child))
+    }
+
+    pub(super) fn center(&self) -> Vec3 {
+        self.center
+    }
+
+    /// Cosine of the angle from the middle to the farthest corner.
+    pub(super) fn cos_radius(&self) -> f32 {
+        self.cos
+    }
+
+    /// Whether a cone and this triangle may have a direction in common. Never wrongly false.
+    pub(super) fn touches(&self, cone: &ConeTest) -> bool {
+        // Around the triangle: angle(axis, center) ≤ cone's angle + radius, without leaving cosines.
+        if cone.cos <= -self.cos {
+            return true;
+        }
+        if self.center.dot(cone.axis) < cone.cos * self.cos - cone.sin * self.sin - ConeTest::SLACK
+        {
+            return false;
+        }
+        // The edges' great circles; a cone wider than a hemisphere reaches across every one.
+        if cone.cos <= 0.0 {
+            return true;
+        }
+        EDGE_ENDS.iter().all(|&[a, b]| {
+            let normal = self.corners[a].cross(self.corners[b]);
+            let (inward, size) = if normal.dot(self.center) < 0.0 {
+                (-normal, normal.length())
+            } else {
+                (normal, normal.length())
+            };
+            inward.dot(cone.axis) >= -cone.sin * size - ConeTest::SLACK
+        })
+    }
+
+    /// ∫ weight(direction) · (linear interpolation of `values`) dω over the triangle by quadrature of degree 5 on
+    /// each of 4^`splits` parts (Radon's seven points), and ∫ weight dω. The solid angle of an area dA of a face, at
+    /// distance 1/√3 from the origin, is dω = dA / (√3 |p|³).
+    pub(super) fn integrate(
+        &self,
+        values: [DVec3; 3],
+        splits: u32,
+        weight: &impl Fn(Vec3) -> f32,
+    ) -> (DVec3, f64) {
+        if splits > 0 {
+            let mids = EDGE_ENDS.map(|[a, b]| 0.5 * (values[a] + values[b]));
+            return (0..4).fold((DVec3::ZERO, 0.0), |(sum, total), i| {
+                let (s, t) =
+                    self.child(i)
+                        .integrate(child_corners(values, mids, i), splits - 1, weight);
+                (sum + s, total + t)
+            });
+        }
+        let [a, b, c] = self.corners;
+        let area = 0.5 * f64::from((b - a).cross(c - a).length());
+        let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+        for (l, w) in RADON {
+            let p = a * l[0] as f32 + b * l[1] as f32 + c * l[2] as f32;
+            let length = p.length();
+            let jacobian = area * w / (3.0_f64.sqrt() * f64::from(length * length * length));
+            let density = jacobian * f64::from(weight(p / length));
+            sum += density * (values[0] * l[0] + values[1] * l[1] + values[2] * l[2]);
+            total += density;
+        }
+        (sum, total)
+    }
+
+    /// Solid angle in steradians to first order: the Jacobian in the middle. For weighting neighbours only.
+    pub(super) fn rough_solid_angle(&self) -> f32 {
+        let [a, b, c] = self.corners;
+        let p = (a + b + c) / 3.0;
+        0.5 * (b - a).cross(c - a).length() / (3.0_f32.sqrt() * p.length().powi(3))
+    }
+}
+
+/// Radon's rule of degree 5 on a triangle: barycentric coordinates and weights.
+const RADON: [([f64; 3], f64); 7] = {
+    const ROOT: f64 = 3.872_983_346_207_417; // √15
+    const NEAR: f64 = (6.0 - ROOT) / 21.0;
+    const FAR: f64 = (6.0 + ROOT) / 21.0;
+    const W_NEAR: f64 = (155.0 - ROOT) / 1200.0;
+    const W_FAR: f64 = (155.0 + ROOT) / 1200.0;
+    const THIRD: f64 = 1.0 / 3.0;
+    [
+        ([THIRD, THIRD, THIRD], 9.0 / 40.0),
+        ([NEAR, NEAR, 1.0 - 2.0 * NEAR], W_NEAR),
+        ([NEAR, 1.0 - 2.0 * NEAR, NEAR], W_NEAR),
+        ([1.0 - 2.0 * NEAR, NEAR, NEAR], W_NEAR),
+        ([FAR, FAR, 1.0 - 2.0 * FAR], W_FAR),
+        ([FAR, 1.0 - 2.0 * FAR, FAR], W_FAR),
+        ([1.0 - 2.0 * FAR, FAR, FAR], W_FAR),
+    ]
+};

@@ -1,0 +1,193 @@
+//! Phong's reflection model, energy-normalised.
+
+use super::error::{ReflectorError, clamped, number, reflectance};
+use super::extent::{Disk, gaussian_over_disk};
+use super::half_vector::cosine_range;
+use super::{HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
+use glam::{Vec2, Vec3};
+use hr_diffuse::{Cone, Rgb};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, TAU};
+use std::sync::Arc;
+
+/// A Lambertian share and a cosine lobe about the mirror direction,
+///
+/// f = kd/π + ks (n + 2)/(2π) max(0, cos ψ)ⁿ,
+///
+/// with ψ the angle between the incident direction and the mirrored outgoing one: the modified Phong model of Lewis
+/// (Computer Graphics Forum 13(2), 1994) as Lafortune and Willems normalise it (report CW 197, 1994). The albedo of the
+/// lobe is ks along the normal and less elsewhere; it is reciprocal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Phong {
+    kd: Rgb,
+    ks: Rgb,
+    n: f32,
+    /// Distance from the mirror direction where the lobe is 10⁻⁷ of its peak.
+    cut: f32,
+    /// Albedo of the lobe for ks = 1, mean over outgoing directions.
+    unit_albedo: f32,
+}
+
+impl Phong {
+    /// Largest exponent: a lobe of 0.03°. Beyond it a mirror is meant.
+    pub const MAX_EXPONENT: f32 = 1e7;
+
+    /// From the diffuse reflectance `kd` and the specular reflectance `ks`, both 0…1 per channel, and the exponent
+    /// `n`, 0…[`MAX_EXPONENT`](Self::MAX_EXPONENT).
+    ///
+    /// # Errors
+    /// [`ReflectorError`] for the first parameter that is out of its range.
+    pub fn new(kd: Rgb, ks: Rgb, n: f32) -> Result<Self, ReflectorError> {
+        let kd = reflectance("Phong", "kd", kd)?;
+        let ks = reflectance("Phong", "ks", ks)?;
+        let n = number("Phong", "n", n, (0.0, Self::MAX_EXPONENT))?;
+        Ok(Self { kd, ks, n, cut: (32.0 / n.max(f32::MIN_POSITIVE)).sqrt(), unit_albedo: mean_albedo(n) })
+    }
+
+    /// What the lobe is multiplied by.
+    fn scale(&self) -> Rgb {
+        self.ks * ((self.n + 2.0) / TAU)
+    }
+
+    /// cosⁿ averaged over a disk; `mirror` is the mirrored outgoing direction, above the horizon.
+    #[inline]
+    fn lobe_over_disk(&self, incident: Vec3, mirror: Vec3, extent: f32) -> f32 {
+        // Distances, not cosines, keep high exponents exact. cosⁿ ψ is below exp(−n ψ²/2).
+        let nearest = extent + self.cut;
+        if incident.distance_squared(mirror) > nearest * nearest {
+            return 0.0;
+        }
+        let Some(disk) = Disk::new(incident, extent) else { return 0.0 };
+        let apart = mirror - disk.middle;
+        let versine = 0.5 * apart.length_squared();
+        if versine >= 1.0 {
+            return 0.0;
+        }
+        let exponent = -self.n * (-versine).ln_1p();
+        if disk.radius2 == 0.0 {
+            return (-exponent).exp();
+        }
+        // The cosine is taken where the lobe and the disk meet: both are like Gaussians, of variances 1/n and r²/4.
+        let share = 0.25 * disk.radius2 * self.n;
+        let step = (share / (1.0 + share)).min((disk.radius2 / (2.0 * versine)).sqrt());
+        let cos = disk.middle.z + step * apart.z;
+        cos / disk.mean_cos * gaussian_over_disk(exponent, 2.0 * share)
+    }
+}
+
+/// A direction of density (n + 1)/2π cosⁿ about the mirror direction, and its weight for ks = 1.
+fn draw(n: f32, outgoing: Vec3, u: Vec2) -> Option<(Vec3, f32)> {
+    let mirror = unit(mirrored(outgoing))?;
+    let log_cos = (1.0 - u.y).clamp(f32::MIN_POSITIVE, 1.0).ln() / (n + 1.0);
+    let versine = -log_cos.exp_m1();
+    let sin = (versine * (2.0 - versine)).max(0.0).sqrt();
+    let (s, c) = (TAU * u.x).sin_cos();
+    let (a, b) = mirror.any_orthonormal_pair();
+    let incident = unit(mirror * (1.0 - versine) + (a * c + b * s) * sin)?;
+    (above(incident) && above(outgoing)).then(|| (incident, (n + 2.0) / (n + 1.0) * incident.z))
+}
+
+/// Mean weight over directions of the lobe and outgoing directions.
+fn mean_albedo(n: f32) -> f32 {
+    const OUT: usize = 12;
+    const RINGS: usize = 12;
+    const TURNS: usize = 24;
+    let mut sum = 0.0_f64;
+    for j in 0..OUT {
+        let cos2 = (j as f32 + 0.5) / OUT as f32;
+        let outgoing = Vec3::new((1.0 - cos2).sqrt(), 0.0, cos2.sqrt());
+        for k in 0..RINGS {
+            for l in 0..TURNS {
+                let u = Vec2::new((l as f32 + 0.5) / TURNS as f32, (k as f32 + 0.5) / RINGS as f32);
+                if let Some((_, weight)) = draw(n, outgoing, u) {
+                    sum += f64::from(weight);
+                }
+            }
+        }
+    }
+    (sum / (OUT * RINGS * TURNS) as f64) as f32
+}
+
+impl Reflector for Phong {
+    fn eval(&self, incident: Vec3, outgoing: Vec3) -> Rgb {
+        if above(incident) && above(outgoing) {
+            self.kd * FRAC_1_PI + self.glossy(incident, outgoing)
+        } else {
+            Rgb::ZERO
+        }
+    }
+
+    fn diffuse(&self) -> Rgb {
+        self.kd
+    }
+
+    fn is_diffuse(&self) -> bool {
+        self.ks == Rgb::ZERO
+    }
+
+    fn glossy(&self, incident: Vec3, outgoing: Vec3) -> Rgb {
+        let versine = 0.5 * incident.distance_squared(mirrored(outgoing));
+        if above(incident) && above(outgoing) && versine < 1.0 {
+            self.scale() * (self.n * (-versine).ln_1p()).exp()
+        } else {
+            Rgb::ZERO
+        }
+    }
+
+    fn glossy_toward_extent(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> Rgb {
+        if above(outgoing) {
+            self.scale() * self.lobe_over_disk(incident, mirrored(outgoing), extent)
+        } else {
+            Rgb::ZERO
+        }
+    }
+
+    fn reflect_sum(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
+        if self.is_diffuse() || !above(outgoing) {
+            return Rgb::ZERO;
+        }
+        let mirror = mirrored(outgoing);
+        let mut sum = Rgb::ZERO;
+        for sample in incident {
+            let lobe = self.lobe_over_disk(sample.direction, mirror, sample.extent);
+            if lobe > 0.0 {
+                sum += sample.irradiance * lobe;
+            }
+        }
+        self.scale() * sum
+    }
+
+    fn glossy_bound(&self, incident: &Cone, outgoing: Vec3) -> f32 {
+        if !above(outgoing) || cosine_range(incident, Vec3::Z).1 <= HORIZON {
+            return 0.0;
+        }
+        // Angles, from distances: a cosine would lose what high exponents need.
+        let mirror = mirrored(outgoing);
+        let between = 2.0 * (0.5 * incident.axis.distance(mirror)).min(1.0).asin();
+        let nearest = (between - incident.angle() - 1e-6).clamp(0.0, FRAC_PI_2);
+        let versine = 2.0 * (0.5 * nearest).sin().powi(2);
+        let lobe = (self.n * (-versine.min(1.0)).ln_1p()).exp();
+        // One part in 10⁴ covers the rounding of the exponentials. 0 × ln 0 is no number, but the lobe of n = 0 is 1.
+        self.scale().max_element() * if self.n > 0.0 { lobe } else { 1.0 } * 1.0001
+    }
+
+    fn glossy_albedo(&self) -> Rgb {
+        self.ks * self.unit_albedo
+    }
+
+    fn lobe(&self, outgoing: Vec3) -> Lobe {
+        if self.is_diffuse() || !above(outgoing) {
+            return Lobe::HEMISPHERE;
+        }
+        Lobe { direction: mirrored(outgoing), width: (self.n + 1.0).sqrt().recip().min(FRAC_PI_2) }
+    }
+
+    fn sample(&self, outgoing: Vec3, u: Vec2) -> Option<Sample> {
+        let (incident, weight) = draw(self.n, outgoing, u)?;
+        Some(Sample { incident, weight: self.ks * weight })
+    }
+
+    /// The base colour is `kd`.
+    fn with_base_color(&self, color: Rgb) -> Option<Arc<dyn Reflector>> {
+        Some(Arc::new(Self { kd: clamped(color), ..*self }))
+    }
+}

@@ -1,0 +1,133 @@
+//! Illumination Samples (paper, section 3.2): what every link leaves at its receiver, and what of it arrives at an
+//! oriented point further down.
+
+use crate::reflector::Incident;
+use crate::Rgb;
+use glam::{Mat3, Vec3};
+use hr_diffuse::{Hierarchy, NodeId, Transfer};
+
+/// Marks samples of receivers that are oriented: their irradiance includes the cosine.
+const ORIENTED: u32 = 1 << 31;
+/// Irradiance is renewed for the place where a sample arrives by at most this factor either way. Beyond it the
+/// inverse square law no longer holds for the sender, and refinement leaves no such links where they matter.
+const MOST_RENEWAL: f32 = 4.0;
+
+/// One link's light: a Dirac impulse from its sender. The direction is that toward the sender from wherever the
+/// sample is used (16 bytes).
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct IlluminationSample {
+    /// Sender's node id, and whether the receiver is oriented.
+    sender: u32,
+    /// Transported irradiance in W/m² (linear RGB).
+    irradiance: [f32; 3],
+}
+
+impl IlluminationSample {
+    /// The sample that a transfer leaves.
+    #[must_use]
+    pub fn new(transfer: &Transfer) -> Self {
+        let flag = if transfer.oriented { ORIENTED } else { 0 };
+        Self { sender: (transfer.sender.0 & !ORIENTED) | flag, irradiance: transfer.irradiance.to_array() }
+    }
+
+    /// Where it comes from.
+    #[must_use]
+    pub fn sender(&self) -> NodeId {
+        NodeId(self.sender & !ORIENTED)
+    }
+
+    /// Irradiance at the receiver, W/m²: on its plane if it is oriented, else perpendicular to the direction.
+    #[must_use]
+    pub fn irradiance(&self) -> Rgb {
+        Rgb::from(self.irradiance)
+    }
+}
+
+/// A node's set of illumination samples.
+pub type SampleSet = Vec<IlluminationSample>;
+
+/// A point of a surface that light arrives at: its place, and the frame whose z is its normal.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Position, in the hierarchy's unit.
+    pub at: Vec3,
+    /// Columns: two tangents and the unit normal.
+    pub frame: Mat3,
+}
+
+impl Place {
+    /// A place with a unit normal; the tangents are any.
+    #[must_use]
+    pub fn new(at: Vec3, normal: Vec3) -> Self {
+        let (x, y) = normal.any_orthonormal_pair();
+        Self { at, frame: Mat3::from_cols(x, y, normal) }
+    }
+
+    /// Unit normal.
+    #[must_use]
+    pub fn normal(&self) -> Vec3 {
+        self.frame.z_axis
+    }
+
+    /// A world direction in the place's frame.
+    #[must_use]
+    pub fn local(&self, direction: Vec3) -> Vec3 {
+        Vec3::new(self.frame.x_axis.dot(direction), self.frame.y_axis.dot(direction), self.frame.z_axis.dot(direction))
+    }
+}
+
+/// The union of the sample sets on the path from the root down to `leaf`, as they arrive at a place of it: pushed
+/// down without a copy in between. Direction, extent and irradiance are renewed for the place (the sender is known),
+/// and the cosine is applied to what ancestors without orientation received. Directions are in the place's frame.
+pub fn arriving<H: Hierarchy>(
+    hierarchy: &H,
+    leaf: NodeId,
+    path: &[&SampleSet],
+    place: &Place,
+    out: &mut Vec<Incident>,
+) {
+    out.clear();
+    let mut receiver = leaf;
+    for samples in path.iter().rev() {
+        if !samples.is_empty() {
+            let from = Place::new(hierarchy.center(receiver), hierarchy.normals(receiver).axis);
+            for sample in *samples {
+                out.extend(arrived(hierarchy, sample, &from, place));
+            }
+        }
+        match hierarchy.parent(receiver) {
+            Some(parent) => receiver = parent,
+            None => break,
+        }
+    }
+}
+
+/// A sample received at `from` as it arrives at `place`; none below the horizon.
+fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Place, place: &Place) -> Option<Incident> {
+    let sender = sample.sender();
+    let (direction, extent) = hierarchy.direction_to(sender, place.at);
+    let cosine = direction.dot(place.normal());
+    // A sender with extent may be partly above the horizon though its middle is not; its light is then weak.
+    let local = place.local(direction);
+    let oriented = sample.sender & ORIENTED != 0;
+    let nearness = |at: Vec3| {
+        if hierarchy.is_distant(sender) {
+            1.0
+        } else {
+            let spread = hierarchy.radius(sender);
+            (hierarchy.center(sender).distance_squared(at) + spread * spread).recip()
+        }
+    };
+    let renewal = if from.at == place.at { 1.0 } else { nearness(place.at) / nearness(from.at) };
+    let scale = if oriented {
+        // The cosine is in the irradiance already; grazing senders keep what the link's form factor found.
+        let before = hierarchy.direction_to(sender, from.at).0.dot(from.normal());
+        let turned = if before > 0.1 && cosine > 0.0 { cosine / before } else { 1.0 };
+        (renewal * turned).clamp(MOST_RENEWAL.recip(), MOST_RENEWAL)
+    } else {
+        renewal.clamp(MOST_RENEWAL.recip(), MOST_RENEWAL) * cosine
+    };
+    (scale > 0.0 && (cosine > 0.0 || extent > 0.0))
+        .then(|| Incident { direction: local, extent, irradiance: sample.irradiance() * scale })
+}

@@ -1,0 +1,54 @@
+//! Errors of the solver: what is wrong, where, and how to mend it.
+
+/// Why a scene cannot be solved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SolveError {
+    /// There is nothing to light.
+    #[error("the scene has no surface; add at least one of non-zero area")]
+    Empty,
+    /// A surface cannot be used.
+    #[error("surface {surface}: {source}")]
+    Surface {
+        /// Index of the surface.
+        surface: usize,
+        /// What is wrong with it.
+        source: crate::geometry::GeometryError,
+    },
+    /// A surface refers to a material that does not exist.
+    #[error("surface {surface} refers to material {material}, but there are {count}; materials count from 0")]
+    Material {
+        /// Index of the surface.
+        surface: usize,
+        /// The index it gives.
+        material: u32,
+        /// Number of materials.
+        count: usize,
+    },
+    /// A material's numbers make no sense.
+    #[error("material {material}: {what} is {value}; it must be finite and {range}")]
+    MaterialValue {
+        /// Index of the material.
+        material: usize,
+        /// Which property.
+        what: &'static str,
+        /// Its value.
+        value: glam::Vec3,
+        /// What is allowed.
+        range: &'static str,
+    },
+    /// A light's numbers make no sense.
+    #[error("light {light}: {what}; it must be finite, and intensities not negative")]
+    Light {
+        /// Index of the light.
+        light: usize,
+        /// Which property.
+        what: &'static str,
+    },
+    /// The error asked for is out of range.
+    #[error("an error of {error} was asked for; it must lie within 0.001 and 1")]
+    Error {
+        /// What was asked for.
+        error: f32,
+    },
+}

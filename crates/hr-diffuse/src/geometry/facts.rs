@@ -1,0 +1,105 @@
+//! What the hierarchy asks of a part of a surface beside its geometry.
+
+use super::{Domain, Geometry, Profile};
+use glam::{Vec2, Vec3, vec2};
+use smallvec::{SmallVec, smallvec};
+
+/// Gauss–Legendre points of order 2 on 0…1.
+const GAUSS: [f32; 2] = [0.211_324_87, 0.788_675_13];
+
+impl Geometry {
+    /// Whether it is bounded by straight edges.
+    #[must_use]
+    pub fn is_polygon(&self) -> bool {
+        matches!(self, Self::Triangle(_) | Self::Quad(_))
+    }
+
+    /// Centre and radius, if it is a sphere.
+    #[must_use]
+    pub fn sphere(&self) -> Option<(Vec3, f32)> {
+        match self {
+            Self::Revolution(revolution) => match revolution.profile() {
+                Profile::Arc { center: 0.0, radius, .. } => Some((revolution.center(), radius)),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// Whether no two points of one side of the surface see each other: flat ones, and the outside of spheres and
+    /// cones.
+    #[must_use]
+    pub fn is_convex(&self, back: bool) -> bool {
+        if self.is_flat() {
+            return true;
+        }
+        let Self::Revolution(revolution) = self else { return true };
+        if matches!(revolution.profile(), Profile::Arc { center, .. } if center > 0.0) {
+            return false;
+        }
+        let uv = vec2(0.0, 0.5);
+        let from_center = self.point(uv) - revolution.center();
+        let outward = from_center - revolution.axis() * from_center.dot(revolution.axis());
+        (self.normal(uv).dot(outward) > 0.0) != back
+    }
+
+    /// Parameters of the middle of a part.
+    #[must_use]
+    pub fn middle(&self, domain: Domain) -> Vec2 {
+        match self {
+            Self::Triangle(_) => domain.lerp(1.0 / 3.0, 1.0 / 3.0),
+            _ => domain.lerp(0.5, 0.5),
+        }
+    }
+
+    /// Weights of the corners of a polygon at (u, v): they sum to 1.
+    #[must_use]
+    pub fn corner_weights(&self, uv: Vec2) -> [f32; 4] {
+        let Vec2 { x: u, y: v } = uv;
+        match self {
+            Self::Triangle(_) => [1.0 - u - v, u, v, 0.0],
+            _ => [(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v],
+        }
+    }
+
+    /// Four points of a part with weights that sum to 1, for means over its area: exact for quadratic functions
+    /// on rectangles.
+    #[must_use]
+    pub fn quadrature(&self, domain: Domain) -> SmallVec<[(Vec2, f32); 4]> {
+        if let Self::Triangle(_) = self {
+            return self.split(domain).into_iter().map(|part| (self.middle(part), 0.25)).collect();
+        }
+        let mut points: SmallVec<[(Vec2, f32); 4]> = smallvec![];
+        for t in GAUSS {
+            for s in GAUSS {
+                let uv = domain.lerp(s, t);
+                points.push((uv, self.jacobian(uv)));
+            }
+        }
+        let sum: f32 = points.iter().map(|(_, w)| w).sum();
+        for (_, weight) in &mut points {
+            *weight /= sum.max(f32::MIN_POSITIVE);
+        }
+        points
+    }
+
+    /// Area-weighted mean of the front normals of a part: of length 1 where it is flat, 0 where it is closed.
+    #[must_use]
+    pub fn mean_normal(&self, domain: Domain) -> Vec3 {
+        if self.is_flat() {
+            return self.normal(self.middle(domain));
+        }
+        // The midpoint rule: its symmetry makes closed surfaces come out as exactly as f32 has it.
+        let steps = if domain.u1 - domain.u0 > 0.2 || domain.v1 - domain.v0 > 0.2 { 12 } else { 4 };
+        let (mut sum, mut area) = (Vec3::ZERO, 0.0);
+        for i in 0..steps {
+            for j in 0..steps {
+                let uv = domain.lerp((i as f32 + 0.5) / steps as f32, (j as f32 + 0.5) / steps as f32);
+                let weight = self.jacobian(uv);
+                sum += self.normal(uv) * weight;
+                area += weight;
+            }
+        }
+        if area > 0.0 { sum / area } else { self.normal(self.middle(domain)) }
+    }
+}

@@ -1,0 +1,491 @@
+//! The element hierarchy: flat arrays indexed by a node id; children are contiguous and come after their parent,
+//! so that push is one forward sweep and pull one backward sweep.
+//!
+//! From the root down: clusters (an obvhs tree, widened), then one element per surface and reflecting side, then
+//! the parts that refinement makes of it. A two-sided surface has two incident fields, so its front and its back
+//! are two elements. Lights without extent are leaves that only send.
+
+use crate::geometry::{Domain, Geometry};
+use crate::hooks::{FLAT_COSINE, Hierarchy, NodeId};
+use crate::scene::{Light, LightKind};
+use crate::visibility::Visibility;
+use crate::{Cone, DiffuseMaterial, Rgb, SurfaceReflectance};
+use glam::{Vec2, Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::ploc::{PlocSearchDistance, SortPrecision};
+use smallvec::SmallVec;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Children per cluster: the binary tree is widened to it.
+const FAN_OUT: usize = 4;
+
+/// What a node stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Several surfaces.
+    Cluster,
+    /// Part of a surface, its front.
+    Front,
+    /// Part of a surface, its back.
+    Back,
+    /// A light without extent.
+    Light,
+}
+
+/// One node: its geometry in unit space, and its place in the tree.
+#[derive(Clone, Copy, Debug)]
+pub struct Element {
+    /// What it stands for.
+    pub kind: Kind,
+    /// Corners of a box that holds it.
+    pub bounds: [Vec3; 2],
+    /// Middle (on the surface, for parts of one).
+    pub center: Vec3,
+    /// Radius about `center` that holds the node.
+    pub radius: f32,
+    /// Directions of its normals.
+    pub normals: Cone,
+    /// Area-weighted mean of its normals: length 1 for flat nodes, 0 for closed ones.
+    pub mean_normal: Vec3,
+    /// Surface area.
+    pub area: f32,
+    /// Parent id; its own id for the root.
+    pub parent: u32,
+    /// Id of the first child.
+    pub first_child: u32,
+    /// Number of children.
+    pub child_count: u32,
+    /// Index of the surface or light; `u32::MAX` for clusters.
+    pub source: u32,
+    /// Index of the material; `u32::MAX` for clusters and lights.
+    pub material: u32,
+    /// The part of the surface.
+    pub domain: Domain,
+    /// Mean diffuse reflectance (area-weighted below clusters).
+    pub reflectance: Rgb,
+    /// Largest channel of what the node can reflect or what an extension makes of it; 0: light that arrives here
+    /// is of no consequence.
+    pub importance: f32,
+    /// Whether an extension takes part here or below.
+    pub active: bool,
+    /// Whether it is a whole sphere seen from outside.
+    pub whole_sphere: bool,
+    /// Whether no two points of the node's side of its surface see each other.
+    pub convex: bool,
+}
+
+impl Element {
+    /// Whether all of the node lies in one plane, so that irradiance has one cosine.
+    #[must_use]
+    pub fn is_flat(&self) -> bool {
+        self.normals.cos_angle > FLAT_COSINE && self.kind != Kind::Cluster
+    }
+
+    /// Whether it is a whole sphere seen from outside: the same from everywhere.
+    #[must_use]
+    pub fn is_whole_sphere(&self) -> bool {
+        self.whole_sphere
+    }
+
+    /// Whether it is part of a surface.
+    #[must_use]
+    pub fn is_patch(&self) -> bool {
+        matches!(self.kind, Kind::Front | Kind::Back)
+    }
+
+    /// Mean of max(0, n·ω) over the node's surface: exact for flat nodes, for closed convex ones (¼), and for
+    /// curved ones seen wholly from the front; in between an interpolation.
+    #[must_use]
+    pub fn mean_cosine(&self, direction: Vec3) -> f32 {
+        mean_cosine(self.mean_normal, direction)
+    }
+}
+
+/// Mean of max(0, n·ω) over normals of which only the mean vector is known (length 0…1).
+#[must_use]
+pub(crate) fn mean_cosine(mean_normal: Vec3, direction: Vec3) -> f32 {
+    let x = mean_normal.dot(direction);
+    let spread = (1.0 - mean_normal.length_squared()).max(0.0);
+    0.5 * (x + (x * x + 0.25 * spread).sqrt())
+}
+
+/// The static part of a scene in unit space, shared by solver and display.
+#[derive(Debug)]
+pub struct SceneData {
+    /// Material of each surface.
+    pub surface_materials: Vec<u32>,
+    /// Shading normals of the surfaces that have any.
+    pub shading_normals: Vec<Option<[Vec3; 4]>>,
+    /// Diffuse materials.
+    pub materials: Vec<DiffuseMaterial>,
+    /// Lights without extent, positions in unit space, intensities scaled to it.
+    pub lights: Vec<Light>,
+    /// Positions of the lights in unit space.
+    pub light_positions: Vec<Vec3>,
+    /// Rays.
+    pub visibility: Visibility,
+    /// Reflectance that varies over surfaces.
+    pub texture: Option<Arc<dyn SurfaceReflectance>>,
+    /// Into and out of unit space.
+    pub normalization: crate::geometry::Normalization,
+}
+
+impl SceneData {
+    /// Surfaces in unit space.
+    #[must_use]
+    pub fn surfaces(&self) -> &[Geometry] {
+        self.visibility.geometries()
+    }
+
+    /// Unit shading normal on the front side: interpolated where the surface has shading normals.
+    #[must_use]
+    pub fn shading_normal(&self, surface: u32, uv: Vec2) -> Vec3 {
+        let geometry = &self.surfaces()[surface as usize];
+        match &self.shading_normals[surface as usize] {
+            None => geometry.normal(uv),
+            Some(n) => {
+                let w = geometry.corner_weights(uv);
+                let normal = n[0] * w[0] + n[1] * w[1] + n[2] * w[2] + n[3] * w[3];
+                normal.try_normalize().unwrap_or_else(|| geometry.normal(uv))
+            }
+        }
+    }
+
+    /// Mean diffuse reflectance of a part of a surface.
+    #[must_use]
+    pub fn reflectance(&self, surface: u32, domain: &Domain) -> Rgb {
+        let textured = self.texture.as_ref().and_then(|texture| {
+            let corners = self.surfaces()[surface as usize].corners(*domain);
+            texture.mean(surface, &corners)
+        });
+        textured.unwrap_or(self.materials[self.surface_materials[surface as usize] as usize].reflectance)
+    }
+}
+
+/// The element hierarchy of a scene.
+#[derive(Debug)]
+pub struct Elements {
+    /// The nodes.
+    pub nodes: Vec<Element>,
+    /// The element of each surface's front and back; `u32::MAX` where there is none.
+    pub surface_nodes: Vec<[u32; 2]>,
+}
+
+struct Boxed(obvhs::aabb::Aabb);
+impl obvhs::Boundable for Boxed {
+    fn aabb(&self) -> obvhs::aabb::Aabb {
+        self.0
+    }
+}
+
+impl Elements {
+    /// Builds clusters and one element per surface and reflecting side. `extra` tells how much an extension
+    /// reflects of a material beside the diffuse part (largest channel); `None` where it takes no part.
+    pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<f32>) -> Self {
+        let mut roots: Vec<Element> = Vec::new();
+        for i in 0..scene.surfaces().len() {
+            let material = &scene.materials[scene.surface_materials[i] as usize];
+            let glossy = extra(scene.surface_materials[i]);
+            let front = patch(scene, i as u32, Kind::Front, Domain::WHOLE, glossy);
+            roots.push(front);
+            if material.two_sided && front.importance > 0.0 {
+                roots.push(patch(scene, i as u32, Kind::Back, Domain::WHOLE, glossy));
+            }
+        }
+        // Fronts and backs in trees of their own: what a cluster faces is then known better.
+        let (fronts, backs): (Vec<Element>, Vec<Element>) = roots.into_iter().partition(|e| e.kind == Kind::Front);
+        let lights: Vec<Element> = (0..scene.lights.len()).map(|i| light(scene, i as u32)).collect();
+        let mut trees: Vec<Tree> = Vec::new();
+        trees.extend(Tree::build(fronts));
+        trees.extend(Tree::build(backs));
+        trees.extend(lights.into_iter().map(Tree::Leaf));
+        let root = if trees.len() == 1 { trees.remove(0) } else { Tree::Inner(trees) };
+        let mut elements = Self { nodes: Vec::new(), surface_nodes: vec![[u32::MAX; 2]; scene.surfaces().len()] };
+        elements.flatten(root);
+        elements
+    }
+
+    /// Lays the tree out breadth first, and fills clusters bottom-up.
+    fn flatten(&mut self, root: Tree) {
+        let mut queue = std::collections::VecDeque::from([(root, 0_u32)]);
+        let mut next = 1_u32;
+        while let Some((tree, parent)) = queue.pop_front() {
+            let id = self.nodes.len() as u32;
+            match tree {
+                Tree::Leaf(mut element) => {
+                    element.parent = parent;
+                    if element.is_patch() {
+                        self.surface_nodes[element.source as usize][usize::from(element.kind == Kind::Back)] = id;
+                    }
+                    self.nodes.push(element);
+                }
+                Tree::Inner(children) => {
+                    self.nodes.push(Element { parent, first_child: next, child_count: children.len() as u32, ..EMPTY });
+                    next += children.len() as u32;
+                    queue.extend(children.into_iter().map(|child| (child, id)));
+                }
+            }
+        }
+        for id in (0..self.nodes.len()).rev() {
+            if self.nodes[id].kind == Kind::Cluster {
+                self.nodes[id] = self.cluster(id);
+            }
+        }
+    }
+
+    fn cluster(&self, id: usize) -> Element {
+        let mut cluster = self.nodes[id];
+        let range = cluster.first_child as usize..(cluster.first_child + cluster.child_count) as usize;
+        let children = || self.nodes[range.clone()].iter().filter(|c| c.kind != Kind::Light);
+        let mut normals: Option<Cone> = None;
+        let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
+        for child in children() {
+            low = low.min(child.bounds[0]);
+            high = high.max(child.bounds[1]);
+            cluster.area += child.area;
+            cluster.mean_normal += child.mean_normal * child.area;
+            cluster.reflectance += child.reflectance * child.area;
+            cluster.importance = cluster.importance.max(child.importance);
+            cluster.active |= child.active;
+            normals = Some(normals.map_or(child.normals, |n| n.union(&child.normals)));
+        }
+        if cluster.area > 0.0 {
+            cluster.mean_normal /= cluster.area;
+            cluster.reflectance /= cluster.area;
+        }
+        if let Some(normals) = normals {
+            cluster.normals = normals;
+            cluster.bounds = [low, high];
+            cluster.center = 0.5 * (low + high);
+            cluster.radius = 0.5 * (high - low).length();
+        }
+        cluster
+    }
+
+    /// Splits a leaf patch; its children are appended. Does nothing to a node that has children already or that
+    /// cannot be split.
+    pub(crate) fn split(&mut self, scene: &SceneData, node: u32) {
+        let parent = self.nodes[node as usize];
+        if parent.child_count > 0 || !parent.is_patch() {
+            return;
+        }
+        let geometry = &scene.surfaces()[parent.source as usize];
+        let first = self.nodes.len() as u32;
+        let parts = geometry.split(parent.domain);
+        for part in &parts {
+            let mut child = patch(scene, parent.source, parent.kind, *part, None);
+            child.parent = node;
+            child.active = parent.active;
+            child.importance = if parent.active {
+                parent.importance
+            } else {
+                child.reflectance.max_element()
+            };
+            self.nodes.push(child);
+        }
+        let parent = &mut self.nodes[node as usize];
+        parent.first_child = first;
+        parent.child_count = parts.len() as u32;
+    }
+
+    /// The leaf that a point of a surface belongs to, or `None` where that side has no element.
+    #[must_use]
+    pub fn leaf_at(&self, scene: &SceneData, surface: u32, back: bool, uv: Vec2) -> Option<NodeId> {
+        let mut node = self.surface_nodes[surface as usize][usize::from(back)];
+        if node == u32::MAX {
+            return None;
+        }
+        loop {
+            let element = &self.nodes[node as usize];
+            if element.child_count == 0 {
+                return Some(NodeId(node));
+            }
+            let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
+            let domains: SmallVec<[Domain; 4]> = self.nodes[children].iter().map(|child| child.domain).collect();
+            node = element.first_child + scene.surfaces()[surface as usize].locate(&domains, uv) as u32;
+        }
+    }
+
+    /// Ids of the leaves that are parts of surfaces, in order.
+    pub fn patch_leaves(&self) -> impl Iterator<Item = u32> + '_ {
+        self.nodes.iter().enumerate().filter(|(_, e)| e.child_count == 0 && e.is_patch()).map(|(i, _)| i as u32)
+    }
+}
+
+const EMPTY: Element = Element {
+    kind: Kind::Cluster,
+    bounds: [Vec3::ZERO; 2],
+    center: Vec3::ZERO,
+    radius: 0.0,
+    normals: Cone::SPHERE,
+    mean_normal: Vec3::ZERO,
+    area: 0.0,
+    parent: 0,
+    first_child: 0,
+    child_count: 0,
+    source: u32::MAX,
+    material: u32::MAX,
+    domain: Domain::WHOLE,
+    reflectance: Rgb::ZERO,
+    importance: 0.0,
+    active: false,
+    whole_sphere: false,
+    convex: false,
+};
+
+/// An element for a part of a surface.
+fn patch(scene: &SceneData, surface: u32, kind: Kind, domain: Domain, glossy: Option<f32>) -> Element {
+    let geometry = &scene.surfaces()[surface as usize];
+    let bounds = geometry.bounds(domain);
+    let (low, high) = (bounds.min, bounds.max);
+    let sign = if kind == Kind::Back { -1.0 } else { 1.0 };
+    let mut normals = geometry.normal_cone(domain);
+    normals.axis *= sign;
+    // A whole closed surface has no middle on it: take the box's.
+    let center = if normals.cos_angle > 0.0 { geometry.point(geometry.middle(domain)) } else { 0.5 * (low + high) };
+    let farthest = (high - center).abs().max((low - center).abs());
+    let mut radius = farthest.length();
+    if geometry.is_polygon() {
+        let corners = geometry.corners(domain);
+        radius = corners.iter().map(|&uv| geometry.point(uv).distance(center)).fold(0.0, f32::max);
+    }
+    let reflectance = scene.reflectance(surface, &domain);
+    Element {
+        kind,
+        bounds: [low, high],
+        center,
+        radius,
+        normals,
+        mean_normal: geometry.mean_normal(domain) * sign,
+        area: geometry.area(domain),
+        source: surface,
+        material: scene.surface_materials[surface as usize],
+        domain,
+        reflectance,
+        importance: reflectance.max_element() + glossy.unwrap_or(0.0),
+        active: glossy.is_some(),
+        whole_sphere: geometry.sphere().is_some() && domain == Domain::WHOLE && geometry.is_convex(kind == Kind::Back),
+        convex: geometry.is_convex(kind == Kind::Back),
+        ..EMPTY
+    }
+}
+
+fn light(scene: &SceneData, index: u32) -> Element {
+    let at = scene.light_positions[index as usize];
+    // A light without extent has no normals; the direction in which distant light travels stands there.
+    let mean_normal = match scene.lights[index as usize].kind {
+        LightKind::Directional { direction } => direction,
+        _ => Vec3::ZERO,
+    };
+    Element { kind: Kind::Light, bounds: [at; 2], center: at, source: index, mean_normal, ..EMPTY }
+}
+
+/// A tree of elements before it is laid out.
+enum Tree {
+    Leaf(Element),
+    Inner(Vec<Tree>),
+}
+
+impl Tree {
+    fn build(elements: Vec<Element>) -> Option<Self> {
+        if elements.len() <= 1 {
+            return elements.into_iter().next().map(Tree::Leaf);
+        }
+        let boxes: Vec<Boxed> = elements
+            .iter()
+            .map(|e| Boxed(obvhs::aabb::Aabb::new(Vec3A::from(e.bounds[0]), Vec3A::from(e.bounds[1]))))
+            .collect();
+        let params = BvhBuildParams {
+            pre_split: false,
+            ploc_search_distance: PlocSearchDistance::High,
+            search_depth_threshold: 0,
+            reinsertion_batch_ratio: 0.2,
+            post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
+            sort_precision: SortPrecision::U64,
+            max_prims_per_leaf: 1,
+            collapse_traversal_cost: 1.0,
+        };
+        let bvh = obvhs::bvh2::builder::build_bvh2(&boxes, params, &mut std::time::Duration::default());
+        let mut slots: Vec<Option<Element>> = elements.into_iter().map(Some).collect();
+        Some(Self::convert(&bvh, 0, &mut slots))
+    }
+
+    fn convert(bvh: &obvhs::bvh2::Bvh2, node: usize, slots: &mut [Option<Element>]) -> Self {
+        let primitives = |n: &obvhs::bvh2::node::Bvh2Node| n.first_index as usize..(n.first_index + n.prim_count) as usize;
+        let leaf = |node: &obvhs::bvh2::node::Bvh2Node, slots: &mut [Option<Element>]| -> Vec<Tree> {
+            primitives(node)
+                .filter_map(|i| slots[bvh.primitive_indices[i] as usize].take())
+                .map(Tree::Leaf)
+                .collect()
+        };
+        let start = &bvh.nodes[node];
+        if start.is_leaf() {
+            let mut leaves = leaf(start, slots);
+            return if leaves.len() == 1 { leaves.remove(0) } else { Tree::Inner(leaves) };
+        }
+        // Widening: open the largest inner node until the fan-out is reached.
+        let mut open: Vec<usize> = vec![start.first_index as usize, start.first_index as usize + 1];
+        while open.len() < FAN_OUT {
+            let largest = open
+                .iter()
+                .enumerate()
+                .filter(|(_, n)| !bvh.nodes[**n].is_leaf())
+                .max_by(|a, b| {
+                    let size = |n: usize| bvh.nodes[n].aabb().half_area();
+                    size(*a.1).total_cmp(&size(*b.1)).then(b.0.cmp(&a.0))
+                })
+                .map(|(i, _)| i);
+            let Some(i) = largest else { break };
+            let first = bvh.nodes[open[i]].first_index as usize;
+            open[i] = first;
+            open.insert(i + 1, first + 1);
+        }
+        Tree::Inner(open.into_iter().map(|n| Self::convert(bvh, n, slots)).collect())
+    }
+}
+
+impl Hierarchy for Elements {
+    fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+    fn children(&self, node: NodeId) -> Range<u32> {
+        let e = &self.nodes[node.index()];
+        e.first_child..e.first_child + e.child_count
+    }
+    fn parent(&self, node: NodeId) -> Option<NodeId> {
+        (node.0 != 0).then(|| NodeId(self.nodes[node.index()].parent))
+    }
+    fn center(&self, node: NodeId) -> Vec3 {
+        self.nodes[node.index()].center
+    }
+    fn radius(&self, node: NodeId) -> f32 {
+        self.nodes[node.index()].radius
+    }
+    fn normals(&self, node: NodeId) -> Cone {
+        self.nodes[node.index()].normals
+    }
+    fn area(&self, node: NodeId) -> f32 {
+        self.nodes[node.index()].area
+    }
+    fn material(&self, node: NodeId) -> Option<u32> {
+        let e = &self.nodes[node.index()];
+        e.is_patch().then_some(e.material)
+    }
+    fn direction_to(&self, sender: NodeId, at: Vec3) -> (Vec3, f32) {
+        let e = &self.nodes[sender.index()];
+        if self.is_distant(sender) {
+            return (-e.mean_normal, 0.0);
+        }
+        let to = e.center - at;
+        let d2 = to.length_squared().max(1e-20);
+        let direction = to / d2.sqrt();
+        // Solid angle over π, no more than that of the bounding ball.
+        let share = (e.area * e.mean_cosine(-direction) / std::f32::consts::PI).min(e.radius * e.radius) / d2;
+        (direction, share.min(1.0).sqrt().asin())
+    }
+    fn is_distant(&self, sender: NodeId) -> bool {
+        let e = &self.nodes[sender.index()];
+        e.kind == Kind::Light && e.mean_normal != Vec3::ZERO
+    }
+}

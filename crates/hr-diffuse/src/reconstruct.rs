@@ -1,0 +1,296 @@
+//! Values at vertices: a smooth reconstruction of the irradiance for display.
+//!
+//! Every leaf is shown as a fan about its middle, through its corners and through the corners that finer
+//! neighbours put on its edges, so that no crack opens where elements of different size meet. The irradiance of a
+//! vertex is gathered anew over the links that light its leaf: the geometry is that of the vertex, and visibility
+//! is renewed where a link carries much of the light.
+
+use crate::Rgb;
+use crate::hierarchy::{Elements, Kind, SceneData};
+use crate::hooks::LightField;
+use crate::links::Links;
+use crate::sampling::hash;
+use crate::segments::visibility_at;
+use crate::transport::Light;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use smallvec::SmallVec;
+use std::collections::HashMap;
+use std::ops::ControlFlow;
+
+/// Light is gathered this far from a vertex toward the middle of its leaf: on an edge or in a corner of a room the
+/// horizon and the rays would graze the neighbouring surface.
+const INSET: f32 = 0.02;
+/// Rays for a link that carries all of a vertex's light; others in proportion.
+const RAYS: f32 = 96.0;
+/// No link gets more rays than this at one vertex.
+const MOST_RAYS: f32 = 24.0;
+/// Links that carry a smaller share of the light keep the visibility they have: partly visible ones, and those
+/// that looked wholly visible or hidden.
+const PARTIAL_SHARE: f32 = 0.002;
+const WHOLE_SHARE: f32 = 0.01;
+/// Most finer levels that a neighbour may have.
+const EDGE_DEPTH: u32 = 14;
+
+/// A corner of a leaf's fan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corner {
+    /// Index of the vertex.
+    pub vertex: u32,
+    /// Where it is on the leaf's surface.
+    pub uv: Vec2,
+}
+
+/// The fans of all leaves, and the irradiance at their vertices.
+#[derive(Clone, Debug, Default)]
+pub struct Vertices {
+    /// Positions in unit space.
+    pub positions: Vec<Vec3>,
+    /// Unit normals on the side of the elements that share the vertex.
+    pub normals: Vec<Vec3>,
+    /// Irradiance, W/m².
+    pub irradiance: Vec<Rgb>,
+    /// The smallest leaf at the vertex.
+    pub leaf: Vec<u32>,
+    /// Where the vertex is on that leaf's surface.
+    pub uv: Vec<Vec2>,
+    /// Fan of each node: middle first, then the outline, counter-clockwise in (u, v).
+    fans: Vec<Corner>,
+    first: Vec<u32>,
+    /// Leaves around each vertex.
+    around: Vec<u32>,
+    first_around: Vec<u32>,
+}
+
+impl Vertices {
+    /// A leaf's fan: its middle, then its outline. Empty for other nodes.
+    #[must_use]
+    pub fn fan(&self, leaf: u32) -> &[Corner] {
+        match self.first.get(leaf as usize..leaf as usize + 2) {
+            Some(range) => &self.fans[range[0] as usize..range[1] as usize],
+            None => &[],
+        }
+    }
+
+    /// The leaves that share a vertex.
+    #[must_use]
+    pub fn leaves_around(&self, vertex: u32) -> &[u32] {
+        let range = &self.first_around[vertex as usize..vertex as usize + 2];
+        &self.around[range[0] as usize..range[1] as usize]
+    }
+
+    /// The triangle of a leaf's fan that holds (u, v): its vertices and their weights, which sum to 1.
+    #[must_use]
+    pub fn interpolation(&self, leaf: u32, uv: Vec2) -> [(u32, f32); 3] {
+        let fan = self.fan(leaf);
+        let Some((middle, outline)) = fan.split_first() else { return [(0, 0.0); 3] };
+        let mut best = [(middle.vertex, 1.0), (middle.vertex, 0.0), (middle.vertex, 0.0)];
+        let mut best_low = f32::NEG_INFINITY;
+        for (i, a) in outline.iter().enumerate() {
+            let b = &outline[(i + 1) % outline.len()];
+            let (p, q, r) = (a.uv - middle.uv, b.uv - middle.uv, uv - middle.uv);
+            let area = p.perp_dot(q);
+            if area.abs() <= f32::MIN_POSITIVE {
+                continue;
+            }
+            let (wa, wb) = (r.perp_dot(q) / area, p.perp_dot(r) / area);
+            let low = wa.min(wb).min(1.0 - wa - wb);
+            if low > best_low {
+                best_low = low;
+                best = [(middle.vertex, 1.0 - wa - wb), (a.vertex, wa), (b.vertex, wb)];
+                if low >= 0.0 {
+                    break;
+                }
+            }
+        }
+        if best_low < 0.0 {
+            // Rounding put the point outside of every triangle: the nearest one, without extrapolation.
+            let sum: f32 = best.iter().map(|(_, w)| w.max(0.0)).sum();
+            for (_, w) in &mut best {
+                *w = w.max(0.0) / sum.max(f32::MIN_POSITIVE);
+            }
+        }
+        best
+    }
+}
+
+/// What makes two corners the same vertex: place, normal, material. Exact, as dyadic points on a shared edge are.
+type Key = ([u32; 3], [i8; 3], u32);
+
+fn key(position: Vec3, normal: Vec3, material: u32) -> Key {
+    // Adding zero makes −0 the same as 0.
+    let bits = (position + Vec3::ZERO).to_array().map(f32::to_bits);
+    (bits, (normal * 60.0).round().to_array().map(|c| c as i8), material)
+}
+
+/// A point of an element as display sees it: position and normal on the element's side.
+fn point_on(scene: &SceneData, elements: &Elements, leaf: u32, uv: Vec2) -> (Vec3, Vec3) {
+    let element = &elements.nodes[leaf as usize];
+    let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
+    let position = scene.surfaces()[element.source as usize].point(uv);
+    (position, scene.shading_normal(element.source, uv) * side)
+}
+
+/// Lays out the fans of all leaves; irradiance is zero still.
+fn lay_out(scene: &SceneData, elements: &Elements) -> Vertices {
+    let mut vertices = Vertices::default();
+    let mut index: HashMap<Key, u32> = HashMap::new();
+    let leaves: Vec<u32> = elements.patch_leaves().collect();
+    let mut shared: Vec<(u32, u32)> = Vec::new();
+    for &leaf in &leaves {
+        let element = &elements.nodes[leaf as usize];
+        for uv in scene.surfaces()[element.source as usize].corners(element.domain) {
+            let (position, normal) = point_on(scene, elements, leaf, uv);
+            let next = vertices.positions.len() as u32;
+            let vertex = *index.entry(key(position, normal, element.material)).or_insert(next);
+            if vertex == next {
+                vertices.add(position, normal, leaf, uv);
+            } else if element.area < elements.nodes[vertices.leaf[vertex as usize] as usize].area {
+                vertices.leaf[vertex as usize] = leaf;
+                vertices.uv[vertex as usize] = uv;
+            }
+        }
+    }
+    vertices.first = vec![0; elements.nodes.len() + 1];
+    let mut filled = 0;
+    for &leaf in &leaves {
+        let element = &elements.nodes[leaf as usize];
+        let geometry = &scene.surfaces()[element.source as usize];
+        while filled <= leaf {
+            vertices.first[filled as usize] = vertices.fans.len() as u32;
+            filled += 1;
+        }
+        let corners = geometry.corners(element.domain);
+        let mut outline: SmallVec<[Corner; 12]> = SmallVec::new();
+        for (i, &a) in corners.iter().enumerate() {
+            let b = corners[(i + 1) % corners.len()];
+            let (position, normal) = point_on(scene, elements, leaf, a);
+            if let Some(&vertex) = index.get(&key(position, normal, element.material)) {
+                outline.push(Corner { vertex, uv: a });
+            }
+            let find = |uv: Vec2| {
+                let (position, normal) = point_on(scene, elements, leaf, uv);
+                index.get(&key(position, normal, element.material)).copied()
+            };
+            along_edge(a, b, EDGE_DEPTH, &find, &mut outline);
+        }
+        let uv = geometry.middle(element.domain);
+        let (position, normal) = point_on(scene, elements, leaf, uv);
+        let middle = vertices.positions.len() as u32;
+        vertices.add(position, normal, leaf, uv);
+        vertices.fans.push(Corner { vertex: middle, uv });
+        shared.push((middle, leaf));
+        shared.extend(outline.iter().map(|corner| (corner.vertex, leaf)));
+        vertices.fans.extend(outline);
+    }
+    while filled as usize <= elements.nodes.len() {
+        vertices.first[filled as usize] = vertices.fans.len() as u32;
+        filled += 1;
+    }
+    shared.sort_unstable();
+    shared.dedup();
+    vertices.first_around = vec![0; vertices.positions.len() + 1];
+    for (vertex, _) in &shared {
+        vertices.first_around[*vertex as usize + 1] += 1;
+    }
+    for i in 0..vertices.positions.len() {
+        vertices.first_around[i + 1] += vertices.first_around[i];
+    }
+    vertices.around = shared.into_iter().map(|(_, leaf)| leaf).collect();
+    vertices
+}
+
+impl Vertices {
+    fn add(&mut self, position: Vec3, normal: Vec3, leaf: u32, uv: Vec2) {
+        self.positions.push(position);
+        self.normals.push(normal);
+        self.irradiance.push(Rgb::ZERO);
+        self.leaf.push(leaf);
+        self.uv.push(uv);
+    }
+}
+
+/// Vertices that finer neighbours put between two corners, in order: they lie on dyadic points of the edge.
+fn along_edge(a: Vec2, b: Vec2, depth: u32, find: &impl Fn(Vec2) -> Option<u32>, out: &mut SmallVec<[Corner; 12]>) {
+    if depth == 0 {
+        return;
+    }
+    let uv = 0.5 * (a + b);
+    if let Some(vertex) = find(uv) {
+        along_edge(a, uv, depth - 1, find, out);
+        out.push(Corner { vertex, uv });
+        along_edge(uv, b, depth - 1, find, out);
+    }
+}
+
+/// Builds the vertices of a solution and gathers their irradiance. Returns them and the number of rays shot.
+/// `watch` is told the share that is done; once it breaks, visibility is that of the links.
+pub(crate) fn reconstruct<L: LightField>(
+    light: Light<'_, L>,
+    links: &Links,
+    watch: &mut dyn FnMut(f32) -> ControlFlow<()>,
+) -> (Vertices, u64) {
+    let mut vertices = lay_out(light.scene, light.elements);
+    let count = vertices.positions.len();
+    let mut rays = 0;
+    let mut renew = true;
+    let chunk = (count / 50).max(2048);
+    let mut irradiance = Vec::with_capacity(count);
+    for start in (0..count).step_by(chunk) {
+        let end = (start + chunk).min(count);
+        let part: Vec<(Rgb, u32)> = (start..end)
+            .into_par_iter()
+            .with_min_len(16)
+            .map(|vertex| gather_at(light, links, vertices.leaf[vertex], vertices.uv[vertex], vertex as u32, renew))
+            .collect();
+        rays += part.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
+        irradiance.extend(part.into_iter().map(|(irradiance, _)| irradiance));
+        renew &= watch(end as f32 / count as f32).is_continue();
+    }
+    vertices.irradiance = irradiance;
+    (vertices, rays)
+}
+
+/// Irradiance at a point of a leaf, gathered over all links that light it.
+fn gather_at<L: LightField>(
+    light: Light<'_, L>,
+    links: &Links,
+    leaf: u32,
+    uv: Vec2,
+    seed: u32,
+    renew: bool,
+) -> (Rgb, u32) {
+    let element = light.element(leaf);
+    let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
+    let (x, n) = point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET));
+    let mut arriving: SmallVec<[(Rgb, f32, u32); 256]> = SmallVec::new();
+    let mut total = 0.0;
+    let mut node = leaf;
+    loop {
+        for link in links.of(node) {
+            let irradiance = light.irradiance_at(x, n, link.sender);
+            let most = irradiance.max_element();
+            if most > 0.0 {
+                total += most * link.visibility.abs().max(0.05);
+                arriving.push((irradiance, link.visibility, link.sender));
+            }
+        }
+        if node == 0 {
+            break;
+        }
+        node = light.element(node).parent;
+    }
+    let (mut sum, mut rays) = (Rgb::ZERO, 0);
+    let seed = hash(seed, 0x51ed);
+    for (irradiance, mut visibility, sender) in arriving {
+        let share = irradiance.max_element() / total;
+        let partial = visibility > 0.0 && visibility < 1.0;
+        if renew && visibility >= 0.0 && share > if partial { PARTIAL_SHARE } else { WHOLE_SHARE } {
+            let count = (share * RAYS).clamp(1.0, MOST_RAYS) as u32;
+            rays += count;
+            visibility = visibility_at(light.scene, light.elements, (x, n, element.source), sender, count, seed);
+        }
+        sum += irradiance * visibility.abs();
+    }
+    (sum, rays)
+}

@@ -1,0 +1,381 @@
+//! Refinement: pairs of elements are split until a link between them carries nearly constant light, or little.
+//!
+//! Pairs are decided upon in waves: each wave is decided in parallel against a hierarchy that does not change,
+//! then the elements it asked to split are split in order, and the parts make the next wave. So the result does
+//! not depend on the number of threads.
+
+use crate::hierarchy::{Elements, Kind};
+use crate::hooks::LightField;
+use crate::links::Link;
+use crate::oracle::{FactorBounds, factor_bounds};
+use crate::segments;
+use crate::stats::Skipped;
+use crate::transport::{Exitant, Light};
+use crate::geometry::Domain;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use smallvec::{SmallVec, smallvec};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+/// Share of the oracle's interval that counts as error where it stems from geometry: the transported value is an
+/// average over the interval, and display renews the geometry per vertex.
+const GEOMETRY_SHARE: f32 = 0.25;
+/// The same where it stems from the sender's uneven radiosity.
+const RADIOSITY_SHARE: f32 = 0.5;
+/// Segments per link: first a few, then as many as its light is worth.
+const FIRST_SEGMENTS: u32 = 4;
+const MOST_SEGMENTS: u32 = 32;
+
+/// A link to be, between two nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Pair {
+    pub(crate) receiver: u32,
+    pub(crate) sender: u32,
+}
+
+/// When is a link good enough?
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tolerance {
+    /// Irradiance × importance × √(receiver's share of all area) that a link may be wrong by.
+    pub(crate) error: f32,
+    /// Total surface area, the measure of a receiver's.
+    pub(crate) area: f32,
+    /// Radius in unit space below which elements are not split.
+    pub(crate) smallest: f32,
+}
+
+/// What becomes of a pair.
+enum Verdict {
+    Black,
+    Facing,
+    Unlit,
+    Keep(Link),
+    SplitReceiver,
+    SplitSender,
+    SplitBoth,
+}
+
+/// What a refinement made.
+#[derive(Debug, Default)]
+pub(crate) struct Refined {
+    pub(crate) links: Vec<Link>,
+    pub(crate) unlit: Vec<Pair>,
+    pub(crate) skipped: Skipped,
+    pub(crate) pairs: u64,
+    pub(crate) rays: u64,
+    pub(crate) visibility_seconds: f64,
+    pub(crate) stopped: bool,
+    pub(crate) changed: bool,
+}
+
+/// Work counters that threads share. Sums of integers: their order does not matter.
+#[derive(Default)]
+struct Counters {
+    rays: AtomicU64,
+    nanoseconds: AtomicU64,
+}
+
+/// Refines `links` and `unlit` pairs until each is within tolerance. `watch` is asked before each wave with the
+/// number of pairs in it; once it breaks, pairs are linked as they are.
+pub(crate) fn refine<L: LightField>(
+    light: &mut MutableLight<'_, L>,
+    links: Vec<Link>,
+    unlit: Vec<Pair>,
+    tolerance: Tolerance,
+    watch: &mut dyn FnMut(u64, u64) -> ControlFlow<()>,
+) -> Refined {
+    let mut refined = Refined::default();
+    let mut wave: Vec<(Pair, Option<Link>)> =
+        links.into_iter().map(|l| (Pair { receiver: l.receiver, sender: l.sender }, Some(l))).collect();
+    wave.extend(unlit.into_iter().map(|pair| (pair, None)));
+    let counters = Counters::default();
+    while !wave.is_empty() {
+        if !refined.stopped && watch(wave.len() as u64, refined.links.len() as u64).is_break() {
+            refined.stopped = true;
+        }
+        let stopped = refined.stopped;
+        refined.pairs += wave.len() as u64;
+        let reader = light.read();
+        let verdicts: Vec<Verdict> = wave
+            .par_iter()
+            .with_min_len(64)
+            .map(|(pair, old)| decide(reader, *pair, *old, tolerance, stopped, &counters))
+            .collect();
+        split_elements(light, &wave, &verdicts);
+        let elements = &*light.elements;
+        let mut next = Vec::new();
+        for ((pair, _), verdict) in wave.iter().zip(&verdicts) {
+            let parts = |node: u32| {
+                let e = &elements.nodes[node as usize];
+                e.first_child..e.first_child + e.child_count
+            };
+            match verdict {
+                Verdict::Black => refined.skipped.black_receivers += 1,
+                Verdict::Facing => refined.skipped.facing += 1,
+                Verdict::Unlit => {
+                    refined.skipped.unlit_senders += 1;
+                    refined.unlit.push(*pair);
+                }
+                Verdict::Keep(link) => {
+                    refined.skipped.proved_free += u64::from(link.visibility < 0.0);
+                    refined.links.push(*link);
+                }
+                Verdict::SplitReceiver => {
+                    next.extend(parts(pair.receiver).map(|receiver| (Pair { receiver, ..*pair }, None)));
+                }
+                Verdict::SplitSender => next.extend(parts(pair.sender).map(|sender| (Pair { sender, ..*pair }, None))),
+                Verdict::SplitBoth => {
+                    for receiver in parts(pair.receiver) {
+                        next.extend(parts(pair.sender).map(|sender| (Pair { receiver, sender }, None)));
+                    }
+                }
+            }
+        }
+        refined.changed |= !next.is_empty();
+        wave = next;
+    }
+    refined.rays = counters.rays.into_inner();
+    refined.visibility_seconds = counters.nanoseconds.into_inner() as f64 * 1e-9 / rayon::current_num_threads() as f64;
+    refined
+}
+
+/// What refinement needs to write: the hierarchy grows, and new elements inherit their parent's light.
+pub(crate) struct MutableLight<'a, L: LightField> {
+    pub(crate) scene: &'a crate::hierarchy::SceneData,
+    pub(crate) elements: &'a mut Elements,
+    pub(crate) exitant: &'a mut Exitant,
+    pub(crate) field: &'a L,
+    pub(crate) reflected: &'a mut Vec<L::Exitant>,
+}
+
+impl<L: LightField> MutableLight<'_, L> {
+    fn read(&self) -> Light<'_, L> {
+        Light {
+            scene: self.scene,
+            elements: self.elements,
+            exitant: self.exitant,
+            field: self.field,
+            reflected: self.reflected,
+        }
+    }
+}
+
+fn split_elements<L: LightField>(
+    light: &mut MutableLight<'_, L>,
+    wave: &[(Pair, Option<Link>)],
+    verdicts: &[Verdict],
+) {
+    for ((pair, _), verdict) in wave.iter().zip(verdicts) {
+        let nodes: SmallVec<[u32; 2]> = match verdict {
+            Verdict::SplitReceiver => smallvec![pair.receiver],
+            Verdict::SplitSender => smallvec![pair.sender],
+            Verdict::SplitBoth => smallvec![pair.receiver, pair.sender],
+            _ => continue,
+        };
+        for node in nodes {
+            light.elements.split(light.scene, node);
+            let (scene, exitant) = (light.scene, &mut *light.exitant);
+            for child in exitant.radiosity.len()..light.elements.nodes.len() {
+                let element = &light.elements.nodes[child];
+                let parent = element.parent as usize;
+                // A textured part reflects its own share of the parent's irradiance.
+                let emitted = if element.kind == Kind::Front {
+                    scene.materials[element.material as usize].exitance
+                } else {
+                    Vec3::ZERO
+                };
+                let own = emitted + exitant.irradiance[parent] * element.reflectance;
+                exitant.radiosity.push(own);
+                exitant.range.push([own, own]);
+                exitant.direction.push(element.mean_normal);
+                exitant.irradiance.push(exitant.irradiance[parent]);
+                exitant.reflected_as.push(exitant.reflected_as[parent]);
+                light.reflected.push(L::Exitant::default());
+            }
+        }
+    }
+}
+
+/// Irradiance interval of a pair, split by cause.
+struct Interval {
+    /// Largest possible irradiance (max channel).
+    most: f32,
+    /// Uncertainty from geometry.
+    geometry: f32,
+    /// Uncertainty from the sender's radiosity.
+    radiosity: f32,
+}
+
+fn interval<L: LightField>(light: Light<'_, L>, sender: u32, bounds: &FactorBounds) -> Interval {
+    let (low, high) = light.emitted_bounds(sender, &bounds.from_sender);
+    Interval {
+        most: high.max_element() * bounds.max,
+        geometry: (0.5 * (low + high)).max_element() * (bounds.max - bounds.min),
+        radiosity: (high - low).max_element() * 0.5 * (bounds.max + bounds.min),
+    }
+}
+
+fn decide<L: LightField>(
+    light: Light<'_, L>,
+    pair: Pair,
+    old: Option<Link>,
+    tolerance: Tolerance,
+    stopped: bool,
+    counters: &Counters,
+) -> Verdict {
+    let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
+    if r.importance <= 0.0 || r.kind == Kind::Light {
+        return Verdict::Black;
+    }
+    if r.is_patch() && s.is_patch() && r.source == s.source && r.convex && r.kind == s.kind {
+        return Verdict::Facing;
+    }
+    let own = pair.receiver == pair.sender;
+    if light.is_dark(pair.sender) {
+        return Verdict::Unlit;
+    }
+    if own {
+        return split_self(light, pair.receiver, tolerance, stopped);
+    }
+    let Some(bounds) = factor_bounds(light.scene, r, s) else { return Verdict::Facing };
+    let interval = interval(light, pair.sender, &bounds);
+    let weight = r.importance * (r.area / tolerance.area).sqrt();
+    let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
+    let by_bounds = weight * (GEOMETRY_SHARE * interval.geometry + RADIOSITY_SHARE * interval.radiosity);
+    if by_bounds > tolerance.error {
+        let prefer_sender = interval.radiosity > 2.0 * interval.geometry;
+        if let Some(verdict) = split(choose(light, pair, tolerance, prefer_sender)) {
+            return verdict;
+        }
+    }
+    if let Some(link) = old {
+        return Verdict::Keep(link);
+    }
+    let mut link = Link {
+        receiver: pair.receiver,
+        sender: pair.sender,
+        factor: mean_factor(light, pair),
+        visibility: 0.0,
+    };
+    if link.factor <= 0.0 && bounds.max > 0.0 && !stopped {
+        // The sampled points did not face each other, though some may: no light worth splitting for.
+        link.visibility = 1.0;
+        return Verdict::Keep(link);
+    }
+    // What visibility is worth: rays in proportion to the light at stake, and a split where it is uneven.
+    let stake = weight * interval.most.min(4.0 * estimate(light, &link));
+    let start = Instant::now();
+    let mut blocker = u32::MAX;
+    let (mut seen, mut total, mut rays) =
+        segments::visibility(light.scene, light.elements, pair.receiver, pair.sender, 0..FIRST_SEGMENTS, &mut blocker);
+    let worth = (FIRST_SEGMENTS as f32 * stake / tolerance.error) as u32;
+    let partial = seen > 0.0 && seen < total;
+    if !(partial && stake > tolerance.error && !stopped) {
+        let more = worth.clamp(FIRST_SEGMENTS, MOST_SEGMENTS);
+        if more > FIRST_SEGMENTS {
+            let (a, b, c) = segments::visibility(
+                light.scene,
+                light.elements,
+                pair.receiver,
+                pair.sender,
+                FIRST_SEGMENTS..more,
+                &mut blocker,
+            );
+            seen += a;
+            total += b;
+            rays += c;
+        }
+    }
+    counters.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
+    counters.nanoseconds.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
+    link.visibility = if total > 0.0 { (seen / total).min(1.0) } else { 0.0 };
+    let partial = seen > 0.0 && seen < total;
+    if partial && stake > tolerance.error {
+        if let Some(verdict) = split(choose(light, pair, tolerance, false)) {
+            return verdict;
+        }
+    }
+    Verdict::Keep(link)
+}
+
+/// A node and itself: parts of a convex surface never see each other, parts of anything else may.
+fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Tolerance, stopped: bool) -> Verdict {
+    let element = light.element(node);
+    if element.is_flat() || element.convex && element.is_patch() {
+        return Verdict::Facing;
+    }
+    if element.child_count > 0 {
+        return Verdict::SplitBoth;
+    }
+    // The inside of a curved surface: split while the light that would be lost matters.
+    let (_, high) = light.emitted_bounds(node, &crate::Cone::SPHERE);
+    let weight = element.importance * (element.area / tolerance.area).sqrt();
+    let at_stake = high.max_element() * weight;
+    let splittable = element.is_patch() && element.radius > tolerance.smallest;
+    if at_stake > tolerance.error && splittable && !stopped { Verdict::SplitBoth } else { Verdict::Facing }
+}
+
+/// Which of the two to split: the larger one, or the sender where its radiosity is what is uncertain.
+fn choose<L: LightField>(light: Light<'_, L>, pair: Pair, tolerance: Tolerance, prefer_sender: bool) -> Option<Verdict> {
+    let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
+    let can_split = |e: &crate::hierarchy::Element| {
+        e.kind == Kind::Cluster || e.is_patch() && (e.child_count > 0 || e.radius > tolerance.smallest)
+    };
+    let (receiver, sender) = (can_split(r), can_split(s));
+    match (receiver, sender) {
+        (false, false) => None,
+        (true, false) => Some(Verdict::SplitReceiver),
+        (false, true) => Some(Verdict::SplitSender),
+        (true, true) => {
+            let has_parts = s.child_count > 0;
+            if prefer_sender && has_parts || s.radius > r.radius {
+                Some(Verdict::SplitSender)
+            } else {
+                Some(Verdict::SplitReceiver)
+            }
+        }
+    }
+}
+
+/// Unoccluded factor of a link, averaged over points of a flat receiver.
+fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair) -> f32 {
+    let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
+    let direction = light.direction_to(r.center, pair.sender);
+    let distance = r.center.distance(s.center);
+    // A cluster near by is not a point: what its parts make of irradiance says what it counts for as a whole.
+    let whole = light.emitted(pair.sender, -direction).element_sum();
+    let resolve = s.kind == Kind::Cluster && s.radius > 0.25 * distance && whole > 0.0;
+    let factor_at = |x: Vec3, n: Vec3| {
+        if resolve {
+            (light.irradiance_at(x, n, pair.sender).element_sum() / whole).min(1.0)
+        } else {
+            light.factor_at(x, n, pair.sender)
+        }
+    };
+    if !r.is_flat() {
+        return factor_at(r.center, direction);
+    }
+    let normal = r.normals.axis;
+    if r.radius < 0.05 * (distance - s.radius) {
+        return factor_at(r.center, normal);
+    }
+    let geometry = &light.scene.surfaces()[r.source as usize];
+    let over = |part: Domain| -> f32 {
+        let at = |&(uv, w): &(Vec2, f32)| w * factor_at(geometry.point(uv), normal);
+        geometry.quadrature(part).iter().map(at).sum()
+    };
+    if distance - s.radius > 2.0 * r.radius {
+        return over(r.domain);
+    }
+    // Near its sender the factor bends more than four points can follow.
+    let parts = geometry.split(r.domain);
+    parts.iter().map(|&part| over(part) * geometry.area(part)).sum::<f32>() / r.area
+}
+
+/// Irradiance that a link would carry unoccluded (max channel).
+fn estimate<L: LightField>(light: Light<'_, L>, link: &Link) -> f32 {
+    let away = -light.direction_to(light.element(link.receiver).center, link.sender);
+    light.emitted(link.sender, away).max_element() * link.factor
+}

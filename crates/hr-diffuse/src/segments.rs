@@ -1,0 +1,134 @@
+//! Segments between random points of two elements: how much of the sender does the receiver see?
+
+use crate::LightKind;
+use crate::hierarchy::{Element, Elements, Kind, SceneData};
+use crate::sampling::{hash, point2, point4, unit};
+use glam::{Vec2, Vec3};
+
+/// A point on a surface below a node.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    at: Vec3,
+    normal: Vec3,
+    surface: u32,
+}
+
+/// Draws a point below a node: down the tree in proportion to area, then uniformly on the surface.
+fn draw(scene: &SceneData, elements: &Elements, mut node: u32, mut choice: f32, u: Vec2) -> Option<Point> {
+    loop {
+        let element = &elements.nodes[node as usize];
+        match element.kind {
+            Kind::Light => return None,
+            Kind::Front | Kind::Back => {
+                let geometry = &scene.surfaces()[element.source as usize];
+                let (at, normal, _) = geometry.sample_area(element.domain, u.x, u.y);
+                let normal = if element.kind == Kind::Back { -normal } else { normal };
+                return Some(Point { at, normal, surface: element.source });
+            }
+            Kind::Cluster => {
+                let total = element.area;
+                let mut rest = choice * total;
+                let mut chosen = None;
+                for child in element.first_child..element.first_child + element.child_count {
+                    let area = elements.nodes[child as usize].area;
+                    if area > 0.0 {
+                        chosen = Some((child, (rest / area).clamp(0.0, 0.999_999)));
+                        if rest < area {
+                            break;
+                        }
+                        rest -= area;
+                    }
+                }
+                (node, choice) = chosen?;
+            }
+        }
+    }
+}
+
+/// Visibility estimated by `count` segments: the share, weighted by the transfer's kernel, that is not blocked,
+/// and the number of rays shot. `None` where no drawn pair faced each other.
+#[must_use]
+pub(crate) fn visibility(
+    scene: &SceneData,
+    elements: &Elements,
+    receiver: u32,
+    sender: u32,
+    range: std::ops::Range<u32>,
+    blocker: &mut u32,
+) -> (f32, f32, u32) {
+    let seed = hash(receiver, sender);
+    let (mut seen, mut total, mut rays) = (0.0, 0.0, 0);
+    let source = &elements.nodes[sender as usize];
+    for i in range {
+        let u = point4(seed, i);
+        let choices = [unit(hash(seed ^ 0x5bd1, i)), unit(hash(seed ^ 0x1b87, i))];
+        let Some(r) = draw(scene, elements, receiver, choices[0], Vec2::new(u.x, u.y)) else { continue };
+        let (target, weight, surface) = match source.kind {
+            Kind::Light => {
+                let (to, cosine) = light_segment(scene, source, r.at, r.normal);
+                (to, cosine, u32::MAX)
+            }
+            _ => {
+                let Some(s) = draw(scene, elements, sender, choices[1], Vec2::new(u.z, u.w)) else { continue };
+                let to = s.at - r.at;
+                let d2 = to.length_squared();
+                let (a, b) = (to.dot(r.normal), -to.dot(s.normal));
+                let weight = if a > 0.0 && b > 0.0 && d2 > 0.0 { a * b / (d2 * (d2 + source.area)) } else { 0.0 };
+                (s.at, weight, s.surface)
+            }
+        };
+        if weight > 0.0 {
+            rays += 1;
+            total += weight;
+            if !scene.visibility.occluded(r.at, target, [r.surface, surface], blocker) {
+                seen += weight;
+            }
+        }
+    }
+    (seen, total, rays)
+}
+
+/// End of a segment from `x` toward a light without extent, and the cosine at `x`.
+fn light_segment(scene: &SceneData, source: &Element, x: Vec3, n: Vec3) -> (Vec3, f32) {
+    match scene.lights[source.source as usize].kind {
+        // Unit space is the unit cube: two of its lengths away is outside.
+        LightKind::Directional { direction } => (x - direction * 2.0, -direction.dot(n)),
+        _ => (source.center, (source.center - x).normalize_or_zero().dot(n)),
+    }
+}
+
+/// Share of a sender that a point with normal `n` on a surface sees, from `count` segments; 0 where none faces it.
+#[must_use]
+pub(crate) fn visibility_at(
+    scene: &SceneData,
+    elements: &Elements,
+    (x, n, surface): (Vec3, Vec3, u32),
+    sender: u32,
+    count: u32,
+    seed: u32,
+) -> f32 {
+    let source = &elements.nodes[sender as usize];
+    let mut blocker = u32::MAX;
+    if source.kind == Kind::Light {
+        let (to, cosine) = light_segment(scene, source, x, n);
+        let free = cosine > 0.0 && !scene.visibility.occluded(x, to, [surface, u32::MAX], &mut blocker);
+        return if free { 1.0 } else { 0.0 };
+    }
+    let seed = hash(seed, sender);
+    let (mut seen, mut total) = (0.0, 0.0);
+    for i in 0..count {
+        let choice = unit(hash(seed ^ 0x68e3, i));
+        let Some(s) = draw(scene, elements, sender, choice, point2(seed, i)) else { continue };
+        let to = s.at - x;
+        let d2 = to.length_squared();
+        let (a, b) = (to.dot(n), -to.dot(s.normal));
+        if a > 0.0 && b > 0.0 && d2 > 0.0 {
+            let weight = a * b / (d2 * (d2 + source.area));
+            total += weight;
+            if !scene.visibility.occluded(x, s.at, [surface, s.surface], &mut blocker) {
+                seen += weight;
+            }
+        }
+    }
+    if total > 0.0 { seen / total } else { 0.0 }
+}

@@ -1,0 +1,102 @@
+//! A finished solution: what is read from it to show it.
+
+use crate::hierarchy::{Elements, SceneData};
+use crate::hooks::{LightField, NodeId};
+use crate::links::Links;
+use crate::reconstruct::{Vertices, reconstruct};
+use crate::solver::{Phase, Progress, Solver};
+use crate::stats::Stats;
+use crate::transport::{Exitant, Light};
+use crate::{Rgb, visibility::Hit};
+use glam::Vec2;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// The light in a scene: hierarchy, links, exitant light per element and irradiance per vertex.
+#[derive(Debug)]
+pub struct Solution<L: LightField = ()> {
+    /// Geometry and rays, in unit space.
+    pub scene: SceneData,
+    /// The element hierarchy.
+    pub elements: Elements,
+    /// Exitant diffuse light per node.
+    pub exitant: Exitant,
+    /// Who lights whom.
+    pub links: Links,
+    /// Smooth irradiance for display.
+    pub vertices: Vertices,
+    /// The extension.
+    pub field: L,
+    /// What it keeps of every node's incident light.
+    pub incident: Vec<L::Incident>,
+    /// What it keeps of every node's exitant light.
+    pub reflected: Vec<L::Exitant>,
+    /// Work done and avoided.
+    pub stats: Stats,
+}
+
+impl<L: LightField> Solver<L> {
+    /// Makes the solution ready for display: values at vertices. Where `watch` breaks, visibility is not renewed
+    /// any more.
+    pub fn finish(mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Solution<L> {
+        let start = Instant::now();
+        let (links, nodes) = (self.links.all().len() as u64, self.elements.nodes.len() as u64);
+        let error = self.settings.error;
+        let (vertices, rays) = reconstruct(self.light(), &self.links, &mut |share| {
+            watch(&Progress { phase: Phase::Reconstruct, fraction: 0.9 + 0.1 * share, error, links, nodes })
+        });
+        self.stats.vertex_rays += rays;
+        self.stats.seconds.reconstruct += start.elapsed().as_secs_f64();
+        Solution {
+            scene: self.scene,
+            elements: self.elements,
+            exitant: self.exitant,
+            links: self.links,
+            vertices,
+            field: self.field,
+            incident: self.incident,
+            reflected: self.reflected,
+            stats: self.stats,
+        }
+    }
+}
+
+impl<L: LightField> Solution<L> {
+    /// Read access to hierarchy and exitant light.
+    #[must_use]
+    pub fn light(&self) -> Light<'_, L> {
+        Light {
+            scene: &self.scene,
+            elements: &self.elements,
+            exitant: &self.exitant,
+            field: &self.field,
+            reflected: &self.reflected,
+        }
+    }
+
+    /// The leaf that a ray hit, on the side that it hit; `None` where that side absorbs everything.
+    #[must_use]
+    pub fn leaf(&self, hit: &Hit) -> Option<NodeId> {
+        self.elements.leaf_at(&self.scene, hit.surface, !hit.front, hit.uv)
+    }
+
+    /// Smooth irradiance (W/m²) at a point of a leaf.
+    #[must_use]
+    pub fn irradiance(&self, leaf: NodeId, uv: Vec2) -> Rgb {
+        let corners = self.vertices.interpolation(leaf.0, uv);
+        corners.iter().map(|&(vertex, weight)| self.vertices.irradiance[vertex as usize] * weight).sum()
+    }
+
+    /// What the extension keeps of the incident light of a leaf and of all its ancestors, the root first.
+    #[must_use]
+    pub fn incident_path(&self, leaf: NodeId) -> Vec<&L::Incident> {
+        let mut path = vec![&self.incident[leaf.index()]];
+        let mut node = leaf.0;
+        while node != 0 {
+            node = self.elements.nodes[node as usize].parent;
+            path.push(&self.incident[node as usize]);
+        }
+        path.reverse();
+        path
+    }
+}

@@ -1,0 +1,628 @@
+//! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
+
+use crate::error::SolveError;
+use crate::geometry::{Geometry, Normalization};
+use crate::hierarchy::{Elements, Kind, SceneData};
+use crate::hooks::{Hierarchy, LightField, NodeId, Transfer};
+use crate::links::Links;
+use crate::refine::{MutableLight, Pair, Tolerance, refine};
+use crate::stats::Stats;
+use crate::transport::{Exitant, Light};
+use crate::visibility::Visibility;
+use crate::{LightKind, Rgb, SceneInput};
+use glam::Vec3;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// A link's tolerance is this share of the error asked for, times the mean irradiance. Chosen so that the error of
+/// the built-in scenes stays below what was asked for.
+const LINK_SHARE: f32 = 0.05;
+/// Elements are not split below this share of the error's square root: features smaller than that are not resolved.
+const SMALLEST_SHARE: f32 = 0.008;
+/// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
+const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
+/// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
+const MOST_ITERATIONS: u32 = 400;
+
+/// What is asked of a solve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Relative error of the solution, 0.001…1: 0.02 is fine, 0.1 coarse.
+    pub error: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { error: 0.05 }
+    }
+}
+
+/// What the solver is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Phase {
+    /// Splitting pairs of elements, with visibility rays.
+    Refine,
+    /// Gathering, pushing, reflecting and pulling light.
+    Transport,
+    /// Values at vertices.
+    Reconstruct,
+}
+
+/// How far a solve is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// What it is doing.
+    pub phase: Phase,
+    /// Rough share of the work done, 0…1.
+    pub fraction: f32,
+    /// Relative error that the solution is believed to have now.
+    pub error: f32,
+    /// Links so far.
+    pub links: u64,
+    /// Elements so far.
+    pub nodes: u64,
+}
+
+/// Solves for the light in a scene. `L` is what light does besides being diffuse radiosity; `()` for nothing.
+#[derive(Debug)]
+pub struct Solver<L: LightField = ()> {
+    pub(crate) scene: SceneData,
+    pub(crate) elements: Elements,
+    pub(crate) exitant: Exitant,
+    pub(crate) links: Links,
+    pub(crate) field: L,
+    pub(crate) incident: Vec<L::Incident>,
+    pub(crate) reflected: Vec<L::Exitant>,
+    pub(crate) settings: Settings,
+    pub(crate) stats: Stats,
+    unlit: Vec<Pair>,
+    /// Irradiance through a node's own links, on flat nodes.
+    own: Vec<Rgb>,
+    /// Light through a node's own links, on nodes that are not flat.
+    transfers: Vec<Vec<Transfer>>,
+    /// What each leaf's own place makes of the light that its ancestors' links carry, as a factor.
+    placed: Vec<f32>,
+    /// Irradiance of each leaf when its light was last reflected by the extension.
+    last_reflected: Vec<Rgb>,
+    /// Area whose light counts.
+    area: f32,
+}
+
+impl<L: LightField> Solver<L> {
+    /// Checks a scene and builds its hierarchy.
+    ///
+    /// # Errors
+    /// A [`SolveError`] where the scene is empty, or some surface, material, light or the error asked for makes no
+    /// sense.
+    pub fn new(input: &SceneInput, settings: Settings, field: L) -> Result<Self, SolveError> {
+        let start = Instant::now();
+        if !(0.001..=1.0).contains(&settings.error) {
+            return Err(SolveError::Error { error: settings.error });
+        }
+        let scene = scene_data(input)?;
+        let elements = Elements::build(&scene, |material| field.active(material));
+        let count = elements.nodes.len();
+        let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
+        let mut solver = Self {
+            scene,
+            elements,
+            exitant: Exitant {
+                radiosity: vec![Rgb::ZERO; count],
+                range: vec![[Rgb::ZERO; 2]; count],
+                direction: vec![Vec3::ZERO; count],
+                irradiance: vec![Rgb::ZERO; count],
+                reflected_as: (0..count as u32).collect(),
+            },
+            links: Links::default(),
+            field,
+            incident: std::iter::repeat_with(L::Incident::default).take(count).collect(),
+            reflected: std::iter::repeat_with(L::Exitant::default).take(count).collect(),
+            settings,
+            stats: Stats { polygons: input.surfaces.len() as u64, ..Stats::default() },
+            unlit: vec![Pair { receiver: 0, sender: 0 }],
+            own: Vec::new(),
+            transfers: Vec::new(),
+            placed: Vec::new(),
+            last_reflected: Vec::new(),
+            area,
+        };
+        solver.pull();
+        solver.stats.seconds.build = start.elapsed().as_secs_f64();
+        Ok(solver)
+    }
+
+    /// Solves. `watch` is told how far it is and may break: then what there is is finished quickly, without
+    /// refining any more.
+    pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        let mut stopped = false;
+        for (pass, looseness) in PASSES.iter().chain(std::iter::repeat(&1.0)).enumerate().take(2 * PASSES.len()) {
+            let last = pass + 1 >= PASSES.len();
+            let changed = self.refine(pass, *looseness, &mut stopped, watch);
+            let goal = if last || stopped { 0.1 * self.settings.error } else { self.settings.error };
+            let most = if last || stopped { MOST_ITERATIONS } else { 3 };
+            for iteration in 0..most {
+                // Once the light is there, and once more when it has spread.
+                if iteration == 1 || iteration == 6 {
+                    self.place();
+                }
+                let residual = self.iterate();
+                let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
+                stopped |= watch(&self.progress(Phase::Transport, fraction, *looseness)).is_break();
+                if self.remaining(residual) < goal {
+                    break;
+                }
+            }
+            if stopped || last && !changed {
+                break;
+            }
+        }
+        self.stats.nodes = self.elements.nodes.len() as u64;
+        self.stats.leaves = self.elements.patch_leaves().count() as u64;
+        self.stats.links = self.links.all().len() as u64;
+    }
+
+    /// Refines all links to a tolerance; tells whether any pair was split.
+    fn refine(
+        &mut self,
+        pass: usize,
+        looseness: f32,
+        stopped: &mut bool,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> bool {
+        let start = Instant::now();
+        let tolerance = Tolerance {
+            error: LINK_SHARE * self.settings.error * looseness * self.mean_irradiance(),
+            area: self.area,
+            smallest: SMALLEST_SHARE * self.settings.error.sqrt(),
+        };
+        let error = self.believed_error(looseness);
+        let (links, unlit) = (self.links.take(), std::mem::take(&mut self.unlit));
+        let nodes = self.elements.nodes.len() as u64;
+        let already = *stopped;
+        let mut light = MutableLight {
+            scene: &self.scene,
+            elements: &mut self.elements,
+            exitant: &mut self.exitant,
+            field: &self.field,
+            reflected: &mut self.reflected,
+        };
+        let mut wave_number = 0.0_f32;
+        let refined = refine(&mut light, links, unlit, tolerance, &mut |wave, done| {
+            if already {
+                return ControlFlow::Break(());
+            }
+            wave_number += 1.0;
+            let fraction = progress_fraction(pass, 0.8 * wave_number / (wave_number + 8.0));
+            watch(&Progress { phase: Phase::Refine, fraction, error, links: wave + done, nodes })
+        });
+        *stopped |= refined.stopped;
+        let count = self.elements.nodes.len();
+        self.links = Links::new(refined.links, count);
+        self.unlit = refined.unlit;
+        self.incident.resize_with(count, L::Incident::default);
+        self.stats.skipped += refined.skipped;
+        self.stats.pairs += refined.pairs;
+        self.stats.rays += refined.rays;
+        self.stats.seconds.visibility += refined.visibility_seconds;
+        self.stats.seconds.refine += start.elapsed().as_secs_f64();
+        refined.changed
+    }
+
+    /// One iteration of the paper: gather, push, reflect, pull. Returns the change of the mean radiosity, relative
+    /// to it.
+    fn iterate(&mut self) -> f32 {
+        let before: Vec<Rgb> = self.exitant.irradiance.clone();
+        let start = Instant::now();
+        self.gather();
+        self.push();
+        let middle = Instant::now();
+        self.reflect();
+        self.pull_reflected();
+        let end = Instant::now();
+        self.pull();
+        self.stats.seconds.transport += (middle - start).as_secs_f64() + end.elapsed().as_secs_f64();
+        self.stats.seconds.reflect += (end - middle).as_secs_f64();
+        let (mut change, mut total) = (0.0_f64, 0.0_f64);
+        for leaf in self.elements.patch_leaves() {
+            let (element, leaf) = (&self.elements.nodes[leaf as usize], leaf as usize);
+            let weight = f64::from(element.area * element.importance);
+            let now = self.exitant.irradiance[leaf];
+            let delta = (now - before[leaf]).abs();
+            change += weight * f64::from(delta.element_sum());
+            total += weight * f64::from(now.element_sum());
+        }
+        let residual = if total > 0.0 { (change / total) as f32 } else { 0.0 };
+        self.stats.iterations += 1;
+        self.stats.residuals.push(residual);
+        residual
+    }
+
+    /// Read access to hierarchy and exitant light.
+    pub(crate) fn light(&self) -> Light<'_, L> {
+        Light {
+            scene: &self.scene,
+            elements: &self.elements,
+            exitant: &self.exitant,
+            field: &self.field,
+            reflected: &self.reflected,
+        }
+    }
+
+    /// Every receiver adds up what its links carry, in parallel, each on its own state.
+    fn gather(&mut self) {
+        let count = self.elements.nodes.len();
+        let mut own = std::mem::take(&mut self.own);
+        let mut transfers = std::mem::take(&mut self.transfers);
+        let mut incident = std::mem::take(&mut self.incident);
+        own.resize(count, Rgb::ZERO);
+        transfers.resize_with(count, Vec::new);
+        let (light, links, field) = (self.light(), &self.links, &self.field);
+        own.par_iter_mut()
+            .zip(&mut transfers)
+            .zip(&mut incident)
+            .enumerate()
+            .with_min_len(64)
+            .for_each(|(node, ((own, transfers), incident))| {
+                *own = Rgb::ZERO;
+                transfers.clear();
+                let element = light.element(node as u32);
+                if element.active {
+                    field.clear(incident);
+                }
+                let flat = element.is_flat();
+                for link in links.of(node as u32) {
+                    let direction = light.direction_to(element.center, link.sender);
+                    let visible = link.factor * link.visibility.abs();
+                    let irradiance = light.emitted(link.sender, -direction) * visible;
+                    if irradiance.max_element() <= 0.0 {
+                        continue;
+                    }
+                    let transfer =
+                        Transfer { sender: NodeId(link.sender), direction, irradiance, oriented: flat };
+                    if flat {
+                        *own += irradiance;
+                    } else {
+                        transfers.push(transfer);
+                    }
+                    if element.active {
+                        field.receive(incident, &transfer);
+                    }
+                }
+            });
+        (self.own, self.transfers, self.incident) = (own, transfers, incident);
+    }
+
+    /// Hands light down to the leaves: the sum of what their ancestors received. Light on nodes that are not flat
+    /// meets the leaf's own orientation, and its direction and distance are those from the leaf.
+    fn push(&mut self) {
+        let (elements, light) = (&self.elements, self.light());
+        let leaves: Vec<u32> = elements.patch_leaves().collect();
+        let sums: Vec<Rgb> = leaves
+            .par_iter()
+            .with_min_len(64)
+            .map(|&leaf| {
+                let element = light.element(leaf);
+                let mut sum = Rgb::ZERO;
+                let mut node = leaf;
+                loop {
+                    sum += self.own[node as usize];
+                    for transfer in &self.transfers[node as usize] {
+                        let (direction, scale) = renewed(light, transfer, element.center, node);
+                        sum += transfer.irradiance * (element.mean_cosine(direction) * scale);
+                    }
+                    if node == 0 {
+                        break;
+                    }
+                    node = elements.nodes[node as usize].parent;
+                }
+                sum
+            })
+            .collect();
+        self.placed.resize(elements.nodes.len(), 1.0);
+        for (leaf, sum) in leaves.into_iter().zip(sums) {
+            self.exitant.irradiance[leaf as usize] = sum * self.placed[leaf as usize];
+        }
+    }
+
+    /// Form factors are means over the element that a link ends at; a leaf in a corner of it sees more or less.
+    /// Compares the light that arrives at each leaf's middle with what was pushed down to it. In an enclosure
+    /// this makes every leaf's form factors sum to 1, whichever ancestors hold its links.
+    fn place(&mut self) {
+        let start = Instant::now();
+        let (elements, light) = (&self.elements, self.light());
+        let leaves: Vec<u32> = elements.patch_leaves().collect();
+        let factors: Vec<f32> = leaves
+            .par_iter()
+            .with_min_len(16)
+            .map(|&leaf| {
+                let element = light.element(leaf);
+                let normal = element.mean_normal.normalize_or_zero();
+                if !element.is_flat() || normal == Vec3::ZERO {
+                    return 1.0;
+                }
+                let (mut exact, mut pushed) = (0.0, 0.0);
+                let mut node = leaf;
+                loop {
+                    let receiver = light.element(node);
+                    for link in self.links.of(node) {
+                        let visible = link.visibility.abs();
+                        if visible > 0.0 {
+                            exact += visible * light.irradiance_at(element.center, normal, link.sender).element_sum();
+                            let direction = light.direction_to(receiver.center, link.sender);
+                            let carried = light.emitted(link.sender, -direction).element_sum() * link.factor * visible;
+                            pushed += if receiver.is_flat() {
+                                carried
+                            } else {
+                                let transfer = Transfer {
+                                    sender: NodeId(link.sender),
+                                    direction,
+                                    irradiance: Rgb::ZERO,
+                                    oriented: false,
+                                };
+                                let (direction, scale) = renewed(light, &transfer, element.center, node);
+                                carried * element.mean_cosine(direction) * scale
+                            };
+                        }
+                    }
+                    if node == 0 {
+                        break;
+                    }
+                    node = receiver.parent;
+                }
+                if pushed > 0.0 && exact > 0.0 { (exact / pushed).clamp(0.25, 4.0) } else { 1.0 }
+            })
+            .collect();
+        self.placed.clear();
+        self.placed.resize(elements.nodes.len(), 1.0);
+        for (leaf, factor) in leaves.into_iter().zip(factors) {
+            self.placed[leaf as usize] = factor;
+        }
+        self.stats.seconds.transport += start.elapsed().as_secs_f64();
+    }
+
+    /// The extension turns the incident light of its leaves into exitant light.
+    fn reflect(&mut self) {
+        let elements = &self.elements;
+        if !elements.nodes[0].active {
+            return;
+        }
+        let tolerance = 0.1 * self.settings.error;
+        self.last_reflected.resize(elements.nodes.len(), Rgb::splat(f32::NEG_INFINITY));
+        let leaves: Vec<u32> = elements.patch_leaves().filter(|&l| elements.nodes[l as usize].active).collect();
+        let all = leaves.len() as u64;
+        let leaves: Vec<u32> = leaves
+            .into_iter()
+            .filter(|&leaf| {
+                let now = self.exitant.irradiance[leaf as usize];
+                let change = (now - self.last_reflected[leaf as usize]).abs().max_element();
+                change > tolerance * now.max_element()
+            })
+            .collect();
+        self.stats.skipped.converged_leaves += all - leaves.len() as u64;
+        let exitant: Vec<L::Exitant> = leaves
+            .par_iter()
+            .map(|&leaf| {
+                let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
+                let mut node = leaf;
+                while node != 0 {
+                    node = elements.nodes[node as usize].parent;
+                    path.push(&self.incident[node as usize]);
+                }
+                path.reverse();
+                let element = &elements.nodes[leaf as usize];
+                let diffuse = self.exitant.irradiance[leaf as usize] * element.reflectance / std::f32::consts::PI;
+                self.field.reflect(elements, NodeId(leaf), &path, diffuse)
+            })
+            .collect();
+        for (leaf, exitant) in leaves.into_iter().zip(exitant) {
+            self.reflected[leaf as usize] = exitant;
+            self.last_reflected[leaf as usize] = self.exitant.irradiance[leaf as usize];
+        }
+    }
+
+    /// The extension averages its exitant light bottom-up, all nodes of one height in parallel.
+    fn pull_reflected(&mut self) {
+        let elements = &self.elements;
+        if !elements.nodes[0].active {
+            return;
+        }
+        let count = elements.nodes.len();
+        let mut height = vec![0_u32; count];
+        let mut layers: Vec<Vec<u32>> = Vec::new();
+        for node in (0..count).rev() {
+            let element = &elements.nodes[node];
+            let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
+            if let Some(tallest) = height[range].iter().copied().max() {
+                height[node] = tallest + 1;
+                if element.active {
+                    let layer = tallest as usize;
+                    layers.resize_with(layers.len().max(layer + 1), Vec::new);
+                    layers[layer].push(node as u32);
+                }
+            }
+        }
+        for layer in layers {
+            let averages: Vec<L::Exitant> = layer
+                .par_iter()
+                .map(|&node| {
+                    let element = &elements.nodes[node as usize];
+                    let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
+                    self.field.pull(elements, NodeId(node), &self.reflected[range])
+                })
+                .collect();
+            for (node, average) in layer.into_iter().zip(averages) {
+                self.reflected[node as usize] = average;
+            }
+        }
+        for (node, source) in self.exitant.reflected_as.iter_mut().enumerate() {
+            *source = node as u32;
+        }
+    }
+
+    /// Diffuse radiosity of the leaves, averaged bottom-up with its range and direction.
+    fn pull(&mut self) {
+        let exitant = &mut self.exitant;
+        for node in (0..self.elements.nodes.len()).rev() {
+            let element = &self.elements.nodes[node];
+            if element.kind == Kind::Light {
+                continue;
+            }
+            if element.child_count == 0 {
+                let material = &self.scene.materials[element.material as usize];
+                let emitted = if element.kind == Kind::Front { material.exitance } else { Rgb::ZERO };
+                let radiosity = emitted + exitant.irradiance[node] * element.reflectance;
+                exitant.radiosity[node] = radiosity;
+                exitant.range[node] = [radiosity, radiosity];
+                exitant.direction[node] = element.mean_normal;
+                continue;
+            }
+            let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
+            let (mut radiosity, mut irradiance, mut area) = (Rgb::ZERO, Rgb::ZERO, 0.0);
+            let (mut low, mut high) = (Rgb::MAX, Rgb::ZERO);
+            let (mut direction, mut weight) = (Vec3::ZERO, 0.0);
+            for child in range {
+                let part = &self.elements.nodes[child];
+                if part.kind == Kind::Light {
+                    continue;
+                }
+                radiosity += exitant.radiosity[child] * part.area;
+                irradiance += exitant.irradiance[child] * part.area;
+                area += part.area;
+                low = low.min(exitant.range[child][0]);
+                high = high.max(exitant.range[child][1]);
+                let power = exitant.radiosity[child].element_sum() * part.area;
+                direction += exitant.direction[child] * power;
+                weight += power;
+            }
+            if area > 0.0 {
+                exitant.radiosity[node] = radiosity / area;
+                exitant.irradiance[node] = irradiance / area;
+                exitant.range[node] = [low, high];
+            }
+            exitant.direction[node] = if weight > 0.0 { direction / weight } else { element.mean_normal };
+        }
+    }
+
+    /// Mean irradiance of the surfaces that any light reaches; before there is any, that which the emitted power
+    /// would make if it were spread evenly. The measure of every tolerance.
+    fn mean_irradiance(&self) -> f32 {
+        let (mut lit, mut area, mut power) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for leaf in self.elements.patch_leaves() {
+            let (element, leaf) = (&self.elements.nodes[leaf as usize], leaf as usize);
+            let irradiance = self.exitant.irradiance[leaf].max_element();
+            if irradiance > 0.0 {
+                lit += f64::from(irradiance * element.area);
+                area += f64::from(element.area);
+            }
+            power += f64::from(self.exitant.radiosity[leaf].max_element() * element.area);
+        }
+        for light in &self.scene.lights {
+            let spread = match light.kind {
+                LightKind::Directional { .. } => self.area,
+                _ => 4.0 * std::f32::consts::PI,
+            };
+            power += f64::from(light.intensity.max_element() * spread);
+        }
+        if area > 0.0 { (lit / area) as f32 } else { (power / f64::from(self.area)) as f32 }
+    }
+
+    /// What all iterations to come would change, if the residuals go on shrinking as they did last: the sum of the
+    /// geometric series.
+    fn remaining(&self, residual: f32) -> f32 {
+        let before = self.stats.residuals.iter().rev().nth(1).copied().unwrap_or(f32::INFINITY);
+        let rate = (residual / before).clamp(0.0, 0.999);
+        if before.is_finite() { residual * (rate / (1.0 - rate)).max(0.1) } else { residual }
+    }
+
+    fn believed_error(&self, looseness: f32) -> f32 {
+        let residual = self.stats.residuals.last().copied().unwrap_or(1.0);
+        (self.settings.error * looseness).hypot(residual).min(1.0)
+    }
+
+    fn progress(&self, phase: Phase, fraction: f32, looseness: f32) -> Progress {
+        Progress {
+            phase,
+            fraction,
+            error: self.believed_error(looseness),
+            links: self.links.all().len() as u64,
+            nodes: self.elements.nodes.len() as u64,
+        }
+    }
+}
+
+/// Direction and change of irradiance of a transfer as seen from a point inside of the node that received it.
+pub(crate) fn renewed<L: LightField>(light: Light<'_, L>, transfer: &Transfer, at: Vec3, node: u32) -> (Vec3, f32) {
+    let sender = light.element(transfer.sender.0);
+    let direction = light.direction_to(at, transfer.sender.0);
+    if light.elements.is_distant(transfer.sender) {
+        return (direction, 1.0);
+    }
+    let before = light.element(node).center.distance_squared(sender.center);
+    let now = at.distance_squared(sender.center);
+    // Near large senders the inverse square law ends; a factor of four is more than refinement leaves.
+    (direction, (before / now.max(1e-12)).clamp(0.25, 4.0))
+}
+
+/// Share of the work done: each pass costs a few times the one before.
+fn progress_fraction(pass: usize, within: f32) -> f32 {
+    const SHARES: [f32; 5] = [0.0, 0.05, 0.15, 0.4, 0.9];
+    let pass = pass.min(SHARES.len() - 2);
+    SHARES[pass] + (SHARES[pass + 1] - SHARES[pass]) * within.clamp(0.0, 1.0)
+}
+
+/// Checks a scene and maps it to unit space.
+fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
+    if input.surfaces.is_empty() {
+        return Err(SolveError::Empty);
+    }
+    for (i, material) in input.materials.iter().enumerate() {
+        let wrong = |what, value, range| Err(SolveError::MaterialValue { material: i, what, value, range });
+        let r = material.reflectance;
+        if !r.is_finite() || r.min_element() < 0.0 || r.max_element() > 1.0 {
+            return wrong("reflectance", r, "within 0…1");
+        }
+        let e = material.exitance;
+        if !e.is_finite() || e.min_element() < 0.0 {
+            return wrong("exitance", e, "not negative");
+        }
+    }
+    for (surface, s) in input.surfaces.iter().enumerate() {
+        if s.material as usize >= input.materials.len() {
+            return Err(SolveError::Material { surface, material: s.material, count: input.materials.len() });
+        }
+    }
+    for (light, l) in input.lights.iter().enumerate() {
+        if !l.position.is_finite() {
+            return Err(SolveError::Light { light, what: "its position is not finite" });
+        }
+        if !l.intensity.is_finite() || l.intensity.min_element() < 0.0 {
+            return Err(SolveError::Light { light, what: "its intensity is negative or not finite" });
+        }
+    }
+    let normalization = Normalization::new(&input.surfaces);
+    let surfaces = input
+        .surfaces
+        .iter()
+        .enumerate()
+        .map(|(surface, s)| {
+            Geometry::from_surface(s, &normalization).map_err(|source| SolveError::Surface { surface, source })
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let scale2 = (normalization.scale() * normalization.scale()) as f32;
+    let lights = input.lights.iter().map(|l| match l.kind {
+        LightKind::Directional { .. } => *l,
+        _ => crate::Light { intensity: l.intensity * scale2, ..*l },
+    });
+    Ok(SceneData {
+        visibility: Visibility::new(&surfaces),
+        surface_materials: input.surfaces.iter().map(|s| s.material).collect(),
+        shading_normals: input.surfaces.iter().map(|s| s.shading_normals).collect(),
+        materials: input.materials.clone(),
+        lights: lights.collect(),
+        light_positions: input.lights.iter().map(|l| normalization.to_unit(l.position)).collect(),
+        texture: input.texture.clone(),
+        normalization,
+    })
+}

@@ -1,0 +1,70 @@
+//! Counters of the work done and of the work avoided, and the time that each phase took.
+
+/// Counts and seconds of a solve.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stats {
+    /// Surfaces handed in.
+    pub polygons: u64,
+    /// Nodes of the hierarchy.
+    pub nodes: u64,
+    /// Leaves that are parts of surfaces.
+    pub leaves: u64,
+    /// Links at the end.
+    pub links: u64,
+    /// Visibility rays shot in the solve.
+    pub rays: u64,
+    /// Visibility rays shot for values at vertices.
+    pub vertex_rays: u64,
+    /// Pairs of elements that the oracle looked at.
+    pub pairs: u64,
+    /// Iterations (gather, push, reflect, pull).
+    pub iterations: u32,
+    /// Change of the mean radiosity by each iteration, relative to its value.
+    pub residuals: Vec<f32>,
+    /// What was skipped, and why.
+    pub skipped: Skipped,
+    /// Seconds by phase.
+    pub seconds: Seconds,
+}
+
+/// Work avoided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Skipped {
+    /// Pairs whose receiver reflects nothing.
+    pub black_receivers: u64,
+    /// Pairs whose sender emits nothing (looked at again once it does).
+    pub unlit_senders: u64,
+    /// Pairs that provably do not face each other.
+    pub facing: u64,
+    /// Links that need no ray: nothing lies between.
+    pub proved_free: u64,
+    /// Leaves whose incident light did not change enough to be reflected anew.
+    pub converged_leaves: u64,
+}
+
+impl std::ops::AddAssign for Skipped {
+    fn add_assign(&mut self, other: Self) {
+        self.black_receivers += other.black_receivers;
+        self.unlit_senders += other.unlit_senders;
+        self.facing += other.facing;
+        self.proved_free += other.proved_free;
+        self.converged_leaves += other.converged_leaves;
+    }
+}
+
+/// Seconds by phase.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seconds {
+    /// Hierarchy and ray tree.
+    pub build: f64,
+    /// Refinement of links, visibility included.
+    pub refine: f64,
+    /// The part of `refine` that was spent on visibility, estimated from the time of the threads that shot rays.
+    pub visibility: f64,
+    /// Gather, push and pull.
+    pub transport: f64,
+    /// Reflection and pull of an extension's light.
+    pub reflect: f64,
+    /// Values at vertices.
+    pub reconstruct: f64,
+}

@@ -1,0 +1,206 @@
+//! The exitant light of every node, and what of it arrives at a point.
+
+use crate::form_factor;
+use crate::hierarchy::{Element, Elements, Kind, SceneData, mean_cosine};
+use crate::hooks::{Hierarchy, LightField, NodeId};
+use crate::oracle::spot_ramp;
+use crate::{Cone, LightKind, Rgb};
+use glam::Vec3;
+use std::f32::consts::PI;
+
+/// Where a node's radius is less than this share of its distance, it is taken as a whole when light is gathered
+/// at a point; else its children are.
+const CLUSTER_FAR: f32 = 0.25;
+
+/// Exitant diffuse light per node.
+#[derive(Clone, Debug, Default)]
+pub struct Exitant {
+    /// Mean diffuse radiosity, emission included, W/m².
+    pub radiosity: Vec<Rgb>,
+    /// Smallest and largest radiosity below the node.
+    pub range: Vec<[Rgb; 2]>,
+    /// Mean normal below the node, weighted by area and radiosity: how a cluster's light is directed.
+    pub direction: Vec<Vec3>,
+    /// Mean irradiance on the node's surfaces, W/m².
+    pub irradiance: Vec<Rgb>,
+    /// Node whose extension state holds the node's directional light: itself, or the nearest ancestor that
+    /// existed when light was last reflected.
+    pub reflected_as: Vec<u32>,
+}
+
+/// Read access to a (partial) solution: geometry, hierarchy and exitant light.
+#[derive(Debug)]
+pub struct Light<'a, L: LightField> {
+    pub(crate) scene: &'a SceneData,
+    pub(crate) elements: &'a Elements,
+    pub(crate) exitant: &'a Exitant,
+    pub(crate) field: &'a L,
+    pub(crate) reflected: &'a [L::Exitant],
+}
+
+impl<L: LightField> Clone for Light<'_, L> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<L: LightField> Copy for Light<'_, L> {}
+
+impl<L: LightField> Light<'_, L> {
+    pub(crate) fn element(&self, node: u32) -> &Element {
+        &self.elements.nodes[node as usize]
+    }
+
+    fn state(&self, node: u32) -> &L::Exitant {
+        &self.reflected[self.exitant.reflected_as[node as usize] as usize]
+    }
+
+    /// What a sender emits in a direction away from it, in the units that [`Link::factor`](crate::links::Link)
+    /// multiplies to irradiance: radiosity-like for nodes with extent (π × radiance for parts of surfaces, π ×
+    /// intensity per area for clusters), intensity for lights.
+    #[must_use]
+    pub fn emitted(&self, sender: u32, away: Vec3) -> Rgb {
+        let element = self.element(sender);
+        match element.kind {
+            Kind::Light => self.scene.lights[element.source as usize].intensity,
+            Kind::Cluster => {
+                let pattern = mean_cosine(self.exitant.direction[sender as usize], away);
+                let mut light = self.exitant.radiosity[sender as usize] * pattern;
+                if element.active {
+                    light += self.field.radiance(self.state(sender), away) * PI;
+                }
+                light.max(Rgb::ZERO)
+            }
+            Kind::Front | Kind::Back => {
+                let mut light = self.exitant.radiosity[sender as usize];
+                if element.active {
+                    let glossy = self.field.radiance(self.state(sender), away) * PI;
+                    light += if element.is_flat() {
+                        glossy
+                    } else {
+                        // Intensity per area over the mean cosine is mean radiance; near the terminator both fade.
+                        glossy / element.mean_cosine(away).max(0.05)
+                    };
+                }
+                light.max(Rgb::ZERO)
+            }
+        }
+    }
+
+    /// Smallest and largest [`emitted`](Self::emitted) over a cone of directions away from the sender, for nodes
+    /// with extent as radiosity (clusters: that of the surfaces inside).
+    #[must_use]
+    pub fn emitted_bounds(&self, sender: u32, away: &Cone) -> (Rgb, Rgb) {
+        let element = self.element(sender);
+        if element.kind == Kind::Light {
+            let intensity = self.scene.lights[element.source as usize].intensity;
+            return (intensity, intensity);
+        }
+        let [mut low, mut high] = self.exitant.range[sender as usize];
+        if element.active {
+            let (least, most) = self.field.radiance_bounds(self.state(sender), away);
+            let scale = if element.is_flat() {
+                PI
+            } else {
+                // Intensity per area is at most the mean cosine times radiance, and that is at most 1.
+                PI / element.mean_cosine(away.axis).max(0.25)
+            };
+            low += least * scale;
+            high += most * scale;
+        }
+        (low.max(Rgb::ZERO), high.max(Rgb::ZERO))
+    }
+
+    /// Whether nothing leaves a node.
+    #[must_use]
+    pub fn is_dark(&self, sender: u32) -> bool {
+        let element = self.element(sender);
+        if element.kind == Kind::Light {
+            return false;
+        }
+        let (_, high) = self.emitted_bounds(sender, &Cone::SPHERE);
+        high.max_element() <= 0.0
+    }
+
+    /// Unoccluded geometric factor of a link toward a receiving point with normal `n` (see
+    /// [`Link::factor`](crate::links::Link)).
+    #[must_use]
+    pub fn factor_at(&self, x: Vec3, n: Vec3, sender: u32) -> f32 {
+        let element = self.element(sender);
+        match element.kind {
+            Kind::Light => {
+                let light = &self.scene.lights[element.source as usize];
+                if let LightKind::Directional { direction } = light.kind {
+                    return (-direction.dot(n)).max(0.0);
+                }
+                let to = element.center - x;
+                let d2 = to.length_squared().max(1e-12);
+                let toward = to / d2.sqrt();
+                let spot = match light.kind {
+                    LightKind::Spot { direction, cos_inner, cos_outer } => {
+                        spot_ramp(-toward.dot(direction), cos_inner, cos_outer)
+                    }
+                    _ => 1.0,
+                };
+                toward.dot(n).max(0.0) * spot / d2
+            }
+            Kind::Cluster => {
+                let to = element.center - x;
+                let d2 = to.length_squared().max(1e-20);
+                let cosine = to.dot(n) / d2.sqrt();
+                cosine.max(0.0) * element.area / (PI * d2 + element.area)
+            }
+            Kind::Front | Kind::Back => {
+                let geometry = &self.scene.surfaces()[element.source as usize];
+                form_factor::point_to_surface(geometry, &element.domain, element.kind == Kind::Back, x, n)
+            }
+        }
+    }
+
+    /// Unoccluded irradiance at a point with normal `n` from a sender. Clusters and unevenly lit surfaces that are
+    /// near are resolved into their parts.
+    #[must_use]
+    pub fn irradiance_at(&self, x: Vec3, n: Vec3, sender: u32) -> Rgb {
+        let element = self.element(sender);
+        let to = x - element.center;
+        let distance = to.length();
+        let children = element.first_child..element.first_child + element.child_count;
+        let near = element.radius > CLUSTER_FAR * distance;
+        if near && !children.is_empty() {
+            let resolve = element.kind == Kind::Cluster || {
+                let [low, high] = self.exitant.range[sender as usize];
+                element.active || (high - low).max_element() > 0.1 * high.max_element()
+            };
+            if resolve {
+                return children.map(|child| self.irradiance_at(x, n, child)).sum();
+            }
+        }
+        let factor = self.factor_at(x, n, sender);
+        if factor <= 0.0 {
+            return Rgb::ZERO;
+        }
+        let away = if distance > 0.0 { to / distance } else { element.normals.axis };
+        self.emitted(sender, away) * factor
+    }
+
+    /// Unit direction from `x` toward a sender; for distant light against its direction.
+    #[must_use]
+    pub fn direction_to(&self, x: Vec3, sender: u32) -> Vec3 {
+        let element = self.element(sender);
+        if self.elements.is_distant(NodeId(sender)) {
+            return -element.mean_normal;
+        }
+        (element.center - x).normalize_or(Vec3::Z)
+    }
+
+    /// The element hierarchy.
+    #[must_use]
+    pub fn elements(&self) -> &Elements {
+        self.elements
+    }
+
+    /// What an extension keeps of a node's exitant light.
+    #[must_use]
+    pub fn reflected(&self, node: NodeId) -> &L::Exitant {
+        self.state(node.0)
+    }
+}

@@ -1,0 +1,258 @@
+//! Against testing every surface, against walls without gaps, and on scenes that trees do not like.
+
+use super::{NO_BLOCKER, Visibility};
+use crate::geometry::tests::{geometry, surface};
+use crate::geometry::{Domain, Geometry};
+use crate::{Shape, Surface};
+use glam::{DVec3, Vec3, dvec3, vec2, vec3};
+use proptest::prelude::*;
+
+fn scene(shapes: impl IntoIterator<Item = Shape>) -> Visibility {
+    let geometries: Vec<Geometry> = shapes.into_iter().map(|shape| geometry(&Surface::new(shape, 0))).collect();
+    Visibility::new(&geometries)
+}
+
+fn blocked(visibility: &Visibility, from: Vec3, to: Vec3) -> bool {
+    visibility.occluded(from, to, [NO_BLOCKER; 2], &mut { NO_BLOCKER })
+}
+
+/// A ray's end: anywhere, or on a lattice, so that rays run along axes, through corners and within planes.
+fn end() -> impl Strategy<Value = Vec3> {
+    let lattice = prop::sample::select(vec![-0.5f32, 0.0, 0.25, 0.5, 1.0, 1.5]);
+    prop_oneof![
+        2 => [-0.5f32..1.5, -0.5f32..1.5, -0.5f32..1.5],
+        1 => [lattice.clone(), lattice.clone(), lattice],
+    ]
+    .prop_map(Vec3::from_array)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+
+    #[test]
+    fn queries_agree_with_testing_all_surfaces(
+        surfaces in prop::collection::vec(surface(), 0..60),
+        rays in prop::collection::vec((end(), end(), 0u32..60, 0u32..60), 40),
+    ) {
+        let geometries: Vec<Geometry> = surfaces.iter().map(geometry).collect();
+        let visibility = Visibility::new(&geometries);
+        let mut cache = NO_BLOCKER;
+        for (from, to, first, second) in rays {
+            let direction = to - from;
+            let length = direction.length();
+            let hits: Vec<(u32, f32)> = (0..geometries.len() as u32)
+                .filter_map(|i| Some((i, geometries[i as usize].intersect(from, direction, 0.0, 1.0)?.0)))
+                .collect();
+            // Within the trims at the ends, which are tested elsewhere, both answers are right.
+            let near = |t: f32| t.min(1.0 - t) * length < 3e-3;
+            let blocks = |(i, _): &&(u32, f32)| {
+                let own = *i == first || *i == second;
+                !(own && geometries[*i as usize].is_flat())
+            };
+            let clear = hits.iter().filter(blocks).all(|hit| !near(hit.1));
+            if clear {
+                let expected = hits.iter().find(blocks).is_some();
+                let found = visibility.occluded(from, to, [first, second], &mut cache);
+                prop_assert_eq!(found, expected, "{} to {}: {:?}, cache {}", from, to, &hits, cache);
+                let again = visibility.occluded(from, to, [first, second], &mut { NO_BLOCKER });
+                prop_assert_eq!(found, again, "the cache changes nothing");
+            }
+            let nearest = hits.iter().map(|hit| hit.1).fold(f32::INFINITY, f32::min);
+            match visibility.closest(from, direction, 0.0, 1.0) {
+                None => prop_assert!(hits.is_empty(), "{from} to {to} misses {hits:?}"),
+                Some(hit) => {
+                    prop_assert_eq!(hit.t, nearest, "{} to {}", from, to);
+                    prop_assert!(hit.point.distance(from + direction * hit.t) < 3e-6, "the hit is on the ray");
+                    prop_assert_eq!(hit.front, hit.normal.dot(direction) < 0.0, "front is where the normal points");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn short_and_long_segments_meet_a_wall_between_them(
+        length in -4.0f32..0.5, share in 0.1f32..0.9, tilt in -1f32..1.0,
+    ) {
+        let wall = scene([Shape::Quad([dvec3(0.5, 0.0, 0.0), dvec3(0.5, 1.0, 0.0), dvec3(0.5, 1.0, 1.0), dvec3(0.5, 0.0, 1.0)])]);
+        let step = vec3(1.0, tilt, 0.2).normalize() * 10f32.powf(length) * 0.3;
+        let middle = vec3(0.5, 0.5, 0.5);
+        prop_assert!(blocked(&wall, middle - step * share, middle + step * (1.0 - share)), "step {step}");
+        // Ends on the wall are not blocked by it, known as their surface or not.
+        prop_assert!(!blocked(&wall, middle, middle + step), "from the wall");
+        prop_assert!(!blocked(&wall, middle - step, middle), "to the wall");
+    }
+}
+
+/// A wall in the plane x = 0.5, n×n cells over the unit square, corners at random offsets (or on the lattice),
+/// alternating quadrilaterals and pairs of triangles with either diagonal.
+fn wall(n: usize, jitter: f64, place: impl Fn(f64, f64) -> DVec3) -> Vec<Shape> {
+    let offset = |i: usize, j: usize, k: usize| {
+        let inside = i > 0 && j > 0 && i < n && j < n;
+        let noise = ((i * 7919 + j * 104_729 + k * 31) % 1000) as f64 / 1000.0 - 0.5;
+        if inside { jitter * noise } else { 0.0 }
+    };
+    let corner = |i: usize, j: usize| {
+        let step = 1.0 / n as f64;
+        place(step * (i as f64 + offset(i, j, 0)), step * (j as f64 + offset(i, j, 1)))
+    };
+    let mut shapes = Vec::new();
+    for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
+        let (a, b, c, d) = (corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1));
+        match (i + 2 * j) % 3 {
+            0 => shapes.push(Shape::Quad([a, b, c, d])),
+            1 => shapes.extend([Shape::Triangle([a, b, c]), Shape::Triangle([c, d, a])]),
+            _ => shapes.extend([Shape::Triangle([b, c, d]), Shape::Triangle([b, d, a])]),
+        }
+    }
+    shapes
+}
+
+#[test]
+fn walls_do_not_leak() {
+    type Place = fn(f64, f64) -> DVec3;
+    let planes: [(&str, Place, Vec3); 3] = [
+        ("upright", |a, b| dvec3(0.5, a, b), Vec3::X),
+        ("slanted", |a, b| dvec3(0.2 + 0.6 * a, 0.9 * b + 0.05, 0.1 + 0.7 * a + 0.1 * b), vec3(-0.7, -0.1, 0.6)),
+        ("bent", |a, b| dvec3(0.4 + 0.3 * (a - 0.5).abs(), a, b), Vec3::X),
+    ];
+    for (name, place, across) in planes {
+        for (n, jitter) in [(8, 0.0), (13, 0.0), (13, 0.4)] {
+            // Bent cells with jitter are not planar as quadrilaterals only where the fold runs through them.
+            if name == "bent" && (n % 2 == 1 || jitter > 0.0) {
+                continue;
+            }
+            let shapes = wall(n, jitter, place);
+            // Every corner, edge middle and diagonal's middle, as the f32 surfaces have them.
+            let targets: Vec<Vec3> = shapes
+                .iter()
+                .map(|shape| geometry(&Surface::new(shape.clone(), 0)))
+                .flat_map(|g| {
+                    let uvs = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (0.5, 0.0), (0.0, 0.5), (0.3, 0.7)];
+                    uvs.map(|(u, v)| g.point(vec2(u, v)))
+                })
+                // The wall's own border may be missed.
+                .filter(|p| {
+                    let border = |a: f64, b: f64| place(a, b).as_vec3().distance(*p);
+                    !(0..=200).any(|i| {
+                        let f = f64::from(i) / 200.0;
+                        [border(0.0, f), border(1.0, f), border(f, 0.0), border(f, 1.0)].iter().any(|d| *d < 6e-3)
+                    })
+                })
+                .collect();
+            assert!(targets.len() > n * n, "there is something to aim at");
+            let visibility = scene(shapes);
+            let mut leaks = 0;
+            let mut rays = 0;
+            for target in targets {
+                for aside in [Vec3::ZERO, vec3(0.0, 0.25, 0.0), vec3(0.1, 0.2, -0.3), vec3(0.013, -0.4, 0.37)] {
+                    for side in [1.0, -1.0] {
+                        let step = side * (0.5 * across + aside);
+                        rays += 2;
+                        leaks += u32::from(!blocked(&visibility, target - step, target + step));
+                        leaks += u32::from(visibility.closest(target - step, step, 0.0, 2.0).is_none());
+                    }
+                }
+            }
+            assert_eq!(leaks, 0, "of {rays} rays, {name} wall of {n}×{n}, jitter {jitter}");
+        }
+    }
+}
+
+#[test]
+fn abutting_surfaces_are_free_at_the_corner() {
+    let floor = Shape::Quad([DVec3::ZERO, DVec3::X, dvec3(1.0, 1.0, 0.0), DVec3::Y]);
+    let wall = Shape::Quad([DVec3::ZERO, DVec3::Y, dvec3(0.0, 1.0, 1.0), DVec3::Z]);
+    let room = scene([floor, wall]);
+    for i in 0..=16 {
+        let f = i as f32 / 16.0;
+        // From the shared edge to anywhere in the room, and from patch to patch.
+        assert!(!blocked(&room, vec3(0.0, f, 0.0), vec3(0.7, 0.3, 0.9)), "from the edge at {f}");
+        assert!(!blocked(&room, vec3(0.01 * f, 0.5, 0.0), vec3(0.0, 0.4, 0.01)), "across the corner at {f}");
+        assert!(blocked(&room, vec3(0.5, 0.5, 0.5), vec3(0.5 * f, 0.5, -0.5)), "through the floor at {f}");
+    }
+}
+
+#[test]
+fn curved_surfaces_block_their_own_far_side_only() {
+    let center = dvec3(0.5, 0.5, 0.5);
+    for (shape, concave) in [
+        (Shape::Sphere { center, radius: 0.3 }, false),
+        (Shape::Cone { ends: [dvec3(0.5, 0.5, 0.1), dvec3(0.5, 0.5, 0.9)], radii: [0.2, 0.3] }, false),
+        (Shape::Torus { center, axis: DVec3::Z, major: 0.3, minor: 0.1 }, true),
+    ] {
+        let surface = geometry(&Surface::new(shape.clone(), 0));
+        let visibility = Visibility::new(std::slice::from_ref(&surface));
+        let mut free = 0;
+        for i in 0..400u32 {
+            let uv = vec2((i * 37 % 400) as f32 / 400.0, (i as f32 + 0.5) / 400.0);
+            let (point, normal) = (surface.point(uv), surface.normal(uv));
+            let tangent = normal.any_orthonormal_vector();
+            let skip = [0, NO_BLOCKER];
+            let cast = |direction: Vec3| visibility.occluded(point, point + direction, skip, &mut { NO_BLOCKER });
+            // Beyond the opposite point, the far side is in between.
+            let other = surface.point(vec2((uv.x + 0.5).fract(), uv.y));
+            assert!(cast(1.5 * (other - point)), "{shape:?}: through the body at {uv}");
+            // Outward it is free for convex ones, down to grazing directions.
+            for rise in [1.0, 0.1, 1e-2, 1e-3] {
+                let blocked = cast(2.0 * (tangent + normal * rise).normalize());
+                assert!(concave || !blocked, "{shape:?}: leaving at {uv} by {rise}");
+                free += u32::from(!blocked);
+            }
+            // Up to the opposite point nothing is, but the tube of the torus if one starts on its outer half.
+            let hidden = visibility.occluded(point, other, [0, 0], &mut { NO_BLOCKER });
+            assert_eq!(hidden, concave && (uv.y - 0.5).abs() > 0.25, "{shape:?} across from {uv}");
+        }
+        assert!(free > 800, "{shape:?}: most outward rays are free, {free} of 1600");
+    }
+}
+
+#[test]
+fn scenes_that_trees_do_not_like() {
+    let triangle = Shape::Triangle([DVec3::ZERO, DVec3::X, DVec3::Y]);
+    let empty = scene([]);
+    assert!(!blocked(&empty, Vec3::ZERO, Vec3::ONE), "nothing blocks");
+    assert_eq!(empty.closest(Vec3::ZERO, Vec3::X, 0.0, 1.0), None, "nothing is hit");
+    let single = scene([triangle.clone()]);
+    assert!(blocked(&single, vec3(0.2, 0.2, 1.0), vec3(0.2, 0.2, -1.0)), "a tree of one leaf");
+    let hit = single.closest(vec3(0.2, 0.2, 1.0), -Vec3::Z, 0.0, 9.0).expect("in front");
+    assert!(hit.front && hit.t == 1.0 && hit.surface == 0, "{hit:?}");
+    assert_eq!(single.closest_except(vec3(0.2, 0.2, 0.0), Vec3::Z, -1.0, 9.0, 0), None, "its own plane");
+
+    let same = scene(vec![triangle; 4000]);
+    assert!(blocked(&same, vec3(0.2, 0.2, 1.0), vec3(0.2, 0.2, -1.0)), "4000 times the same");
+    let center = DVec3::splat(0.5);
+    let nested = scene((1..=600).map(|i| Shape::Sphere { center, radius: f64::from(i) / 1200.0 }));
+    assert!(!blocked(&nested, Vec3::ZERO, vec3(1.0, 0.0, 0.0)), "past concentric spheres");
+    let hit = nested.closest(vec3(0.5, 0.5, 2.0), -Vec3::Z, 0.0, 9.0).expect("in front");
+    assert_eq!((hit.surface, hit.front), (599, true), "the outermost of concentric spheres");
+
+    for bad in [f32::NAN, f32::INFINITY] {
+        assert!(!blocked(&same, Vec3::splat(bad), Vec3::ONE), "{bad} at one end");
+        assert_eq!(same.closest(Vec3::splat(bad), Vec3::X, 0.0, 1.0), None, "{bad} as origin");
+        assert_eq!(same.closest(Vec3::ZERO, Vec3::splat(bad), 0.0, 1.0), None, "{bad} as direction");
+    }
+    assert!(!blocked(&same, Vec3::splat(0.3), Vec3::splat(0.3)), "no length");
+}
+
+#[test]
+fn ends_just_off_a_surface_see_it() {
+    // A lid a ten-thousandth above the floor hides it: the trim at the ends must not swallow it.
+    let lid = Shape::Quad([dvec3(0.0, 0.0, 1e-4), dvec3(1.0, 0.0, 1e-4), dvec3(1.0, 1.0, 1e-4), dvec3(0.0, 1.0, 1e-4)]);
+    let visibility = scene([lid]);
+    assert!(blocked(&visibility, vec3(0.3, 0.3, 0.0), vec3(0.4, 0.5, 1.0)), "under the lid");
+    assert!(blocked(&visibility, vec3(0.3, 0.3, 0.9e-4), vec3(0.3, 0.3, 1.1e-4)), "both ends at the lid");
+}
+
+#[test]
+fn hits_locate_the_part() {
+    // The parameters of a hit locate the part of the surface that was hit.
+    let quad = Shape::Quad([DVec3::ZERO, DVec3::X, dvec3(0.7, 0.6, 0.0), dvec3(0.1, 0.8, 0.0)]);
+    let surface = geometry(&Surface::new(quad.clone(), 0));
+    let visibility = scene([quad]);
+    let children = surface.split(Domain::WHOLE);
+    for (i, child) in children.iter().enumerate() {
+        let target = surface.point(child.lerp(0.4, 0.6));
+        let hit = visibility.closest(target + vec3(0.1, 0.2, 0.5), vec3(-0.1, -0.2, -0.5), 0.0, 2.0).expect("hit");
+        assert_eq!(surface.locate(&children, hit.uv), i, "part {i} at {}", hit.uv);
+    }
+}

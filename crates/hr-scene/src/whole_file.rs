@@ -1,0 +1,115 @@
+//! Files that are written whole or not at all.
+
+use crate::SceneError;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Writes a file through a temporary one in the same folder, renamed when it is complete, so that nobody ever sees
+/// half a file and an older one survives a failure. A symbolic link keeps pointing where it did. Where `path` is no
+/// regular file (a pipe, a terminal) there is nothing to rename: it is written directly.
+///
+/// # Errors
+/// [`SceneError::Io`] with `path` where the folder cannot be written to, the disk is full, or `fill` fails; nothing is
+/// left behind then.
+pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), SceneError> {
+    write(path, fill).map_err(|source| SceneError::Io { path: path.to_owned(), source })
+}
+
+fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let place = match fs::metadata(path) {
+        Ok(there) if there.is_dir() => {
+            return Err(io::Error::other("this is a folder; give a file name"));
+        }
+        Ok(there) if !there.is_file() => {
+            let mut out = BufWriter::new(fs::OpenOptions::new().write(true).open(path)?);
+            fill(&mut out)?;
+            return out.flush();
+        }
+        Ok(_) => fs::canonicalize(path)?,
+        Err(_) => path.to_owned(),
+    };
+    let (file, partial) = Partial::create(&place)?;
+    let mut out = BufWriter::new(file);
+    fill(&mut out)?;
+    // Data first, name after: a crash in between must not leave an empty file under the final name.
+    out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+    fs::rename(&partial.0, &place)
+}
+
+/// A temporary file that goes away unless it is renamed: its name is free then, and there is nothing to remove.
+struct Partial(PathBuf);
+
+impl Partial {
+    /// Makes a new file beside `place`; its name is unique among threads and processes.
+    fn create(place: &Path) -> io::Result<(File, Self)> {
+        static COUNTER: AtomicU32 = AtomicU32::new(0);
+        let Some(name) = place.file_name() else {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "this names no file"));
+        };
+        loop {
+            let number = COUNTER.fetch_add(1, Ordering::Relaxed);
+            let mut hidden = std::ffi::OsString::from(".");
+            hidden.push(name);
+            hidden.push(format!(".{}-{number}.partial", std::process::id()));
+            let path = place.with_file_name(hidden);
+            match File::create_new(&path) {
+                Ok(file) => return Ok((file, Self(path))),
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(e) => return Err(e),
+            }
+        }
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        // Already failing; the first error is the one to report.
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Folder;
+
+    #[test]
+    fn failure_leaves_the_old_file_and_nothing_else() {
+        let folder = Folder::new("whole-file-failure");
+        let path = folder.path("a.bin");
+        write_whole(&path, |out| out.write_all(b"old")).expect("a first file");
+        let error = write_whole(&path, |out| {
+            out.write_all(b"half of the new")?;
+            Err(io::Error::other("disk full"))
+        })
+        .expect_err("the writer fails");
+        assert!(error.to_string().ends_with("a.bin: disk full"), "'{error}' names file and cause");
+        assert_eq!(fs::read(&path).expect("still there"), b"old", "the old contents survive");
+        assert_eq!(folder.names(), ["a.bin"], "no partial file is left");
+        write_whole(&path, |out| out.write_all(b"new")).expect("a second file");
+        assert_eq!(fs::read(&path).expect("there"), b"new", "replaced");
+        assert_eq!(folder.names(), ["a.bin"], "no partial file is left");
+    }
+
+    #[test]
+    fn impossible_places_are_errors() {
+        let folder = Folder::new("whole-file-places");
+        for path in [folder.path("no/such/folder/a.bin"), folder.path(""), folder.path("x/..")] {
+            write_whole(&path, |out| out.write_all(b"x")).expect_err("cannot be written");
+        }
+        assert!(folder.names().is_empty(), "nothing is left");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_links() {
+        let folder = Folder::new("whole-file-links");
+        write_whole(&folder.path("real"), |out| out.write_all(b"old")).expect("a first file");
+        std::os::unix::fs::symlink("real", folder.path("link")).expect("a link");
+        write_whole(&folder.path("link"), |out| out.write_all(b"new")).expect("written through the link");
+        assert_eq!(fs::read(folder.path("real")).expect("there"), b"new", "the target has the new contents");
+        assert!(fs::symlink_metadata(folder.path("link")).expect("there").is_symlink(), "the link is still one");
+    }
+}

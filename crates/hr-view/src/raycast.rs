@@ -1,0 +1,214 @@
+//! The CPU ray caster: an image of a solution without a GPU.
+//!
+//! Every pixel sends a few rays; where one meets a surface, the diffuse light comes from the irradiance at the
+//! vertices, and the glossy part from one of two sources ([`Mode`]).
+
+use glam::{DVec3, Vec2, Vec3};
+use glossy_ext::{GlossyField, Incident, Place, Reflector, arriving};
+use hr_diffuse::hierarchy::Kind;
+use hr_diffuse::sampling::{hash, point2, unit};
+use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
+use hr_scene::{Camera, Image, Scene};
+use rayon::prelude::*;
+use std::f32::consts::FRAC_1_PI;
+use std::sync::Arc;
+
+/// Lobes narrower than this (standard deviation in radians, about 8°) are followed by rays at the pixel, as the
+/// paper's final ray caster would: a link's sample stands for too much of what is to be seen in them.
+const FOLLOWED: f32 = 0.14;
+/// Rays that follow a narrow lobe, per ray of the pixel.
+const LOBE_RAYS: u32 = 6;
+/// Mirrors in mirrors end here.
+const MOST_BOUNCES: u32 = 4;
+/// Rays start this far from their surface (unit space): what rounding needs.
+const START: f32 = 1e-6;
+
+/// Where the glossy part of a pixel comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// The outgoing distributions of the leaves around, interpolated: what the window shows (paper, section 5).
+    #[default]
+    Distributions,
+    /// The leaf's illumination samples, reflected at the pixel (paper, section 3.4); lobes that are too narrow for
+    /// them are followed by rays.
+    Samples,
+}
+
+/// Renders a solution.
+#[derive(Debug)]
+pub struct RayCaster<'a> {
+    scene: &'a Scene,
+    solution: &'a Solution<GlossyField>,
+    mode: Mode,
+    /// Rays per pixel are this squared.
+    grid: u32,
+}
+
+/// A point that a ray met.
+struct Met {
+    hit: Hit,
+    leaf: NodeId,
+    /// Shading normal on the side that was met, turned so that it sees the ray's origin.
+    normal: Vec3,
+    /// Unit direction back along the ray.
+    away: Vec3,
+    reflector: Arc<dyn Reflector>,
+}
+
+impl<'a> RayCaster<'a> {
+    /// For a scene and its solution.
+    #[must_use]
+    pub fn new(scene: &'a Scene, solution: &'a Solution<GlossyField>, mode: Mode) -> Self {
+        Self { scene, solution, mode, grid: 3 }
+    }
+
+    /// Rays per pixel, squared: 1…16. 3 by default.
+    #[must_use]
+    pub fn with_grid(self, grid: u32) -> Self {
+        Self { grid: grid.clamp(1, 16), ..self }
+    }
+
+    /// The image that a camera takes: linear radiance, W/(m² sr). `watch` is told the share that is done.
+    #[must_use]
+    pub fn render(&self, camera: &Camera, watch: &(dyn Fn(f32) + Sync)) -> Image {
+        let mut image = Image::new(camera.width, camera.height);
+        let width = camera.width as usize;
+        let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
+        let done = std::sync::atomic::AtomicU32::new(0);
+        image.pixels.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+            let mut scratch = Vec::new();
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let seed = hash(x as u32, y as u32 ^ 0x6b43);
+                let mut sum = Rgb::ZERO;
+                for i in 0..self.grid * self.grid {
+                    let cell = Vec2::new((i % self.grid) as f32, (i / self.grid) as f32);
+                    let within = (cell + point2(seed, i)) / self.grid as f32;
+                    let (px, py) = (x as f64 + f64::from(within.x), y as f64 + f64::from(within.y));
+                    let direction = camera.direction(px, py).as_vec3();
+                    sum += self.radiance(eye, direction, u32::MAX, 0, hash(seed, i), &mut scratch);
+                }
+                *pixel = sum / (self.grid * self.grid) as f32;
+            }
+            let rows = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+            watch(rows as f32 / camera.height as f32);
+        });
+        image
+    }
+
+    /// Radiance that arrives at `origin` (unit space) against `direction`.
+    fn radiance(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        own: u32,
+        bounce: u32,
+        seed: u32,
+        scratch: &mut Vec<Incident>,
+    ) -> Rgb {
+        let visibility = &self.solution.scene.visibility;
+        let Some(hit) = visibility.closest_except(origin, direction, START, f32::MAX, own) else { return Rgb::ZERO };
+        let material_index = self.solution.scene.surface_materials[hit.surface as usize];
+        let material = &self.scene.materials[material_index as usize];
+        let emitted = if hit.front { material.exitance * FRAC_1_PI } else { Rgb::ZERO };
+        let Some(leaf) = self.solution.leaf(&hit) else { return emitted };
+        let element = &self.solution.elements.nodes[leaf.index()];
+        let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
+        let base_color = self.scene.base_color(hit.surface, hit.uv.x, hit.uv.y);
+        let reflector = base_color
+            .and_then(|color| material.reflector.with_base_color(color))
+            .unwrap_or_else(|| Arc::clone(&material.reflector));
+        let irradiance = self.solution.irradiance(leaf, hit.uv);
+        let diffuse = reflector.diffuse() * irradiance * FRAC_1_PI;
+        if reflector.is_diffuse() {
+            return emitted + diffuse;
+        }
+        let away = -direction.normalize();
+        let shading = self.solution.scene.shading_normal(hit.surface, hit.uv) * side;
+        // A shading normal that does not see the eye would hide the surface: bend it until it just does.
+        let facing = shading.dot(away);
+        let normal = if facing > 0.02 { shading } else { (shading + away * (0.02 - facing)).normalize() };
+        let met = Met { hit, leaf, normal, away, reflector };
+        let glossy = match self.mode {
+            Mode::Distributions => self.interpolated(&met),
+            Mode::Samples if bounce == 0 => self.reflected(&met, bounce, seed, scratch),
+            Mode::Samples if met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES => {
+                self.reflected(&met, bounce, seed, scratch)
+            }
+            Mode::Samples => self.leaving(leaf, away),
+        };
+        emitted + (diffuse + glossy).max(Rgb::ZERO)
+    }
+
+    /// Glossy radiance from a leaf's distribution.
+    fn leaving(&self, leaf: NodeId, away: Vec3) -> Rgb {
+        let element = &self.solution.elements.nodes[leaf.index()];
+        let light = self.solution.reflected[leaf.index()].eval(away);
+        if element.is_flat() {
+            light
+        } else {
+            // Intensity per area over the cosine; both vanish toward the horizon.
+            light / element.mean_cosine(away).max(0.05)
+        }
+    }
+
+    /// Glossy radiance from the distributions around the vertices, interpolated (paper, section 5.2).
+    fn interpolated(&self, met: &Met) -> Rgb {
+        let vertices = &self.solution.vertices;
+        let mut sum = Rgb::ZERO;
+        for (vertex, weight) in vertices.interpolation(met.leaf.0, met.hit.uv) {
+            if weight > 0.0 {
+                let around = vertices.leaves_around(vertex);
+                let light: Rgb = around.iter().map(|&leaf| self.leaving(NodeId(leaf), met.away)).sum();
+                sum += light * (weight / around.len().max(1) as f32);
+            }
+        }
+        sum
+    }
+
+    /// Glossy radiance from the samples that arrive at the point, or along rays where the lobe is narrow.
+    fn reflected(&self, met: &Met, bounce: u32, seed: u32, scratch: &mut Vec<Incident>) -> Rgb {
+        let place = Place::new(met.hit.point, met.normal);
+        let outgoing = place.local(met.away);
+        let mirror = met.reflector.mirror();
+        let mut light = Rgb::ZERO;
+        if mirror != Rgb::ZERO {
+            let direction = met.normal * (2.0 * met.normal.dot(met.away)) - met.away;
+            light += mirror * self.along(met, direction, bounce, hash(seed, 11), scratch);
+        }
+        if met.reflector.glossy_albedo() == Rgb::ZERO {
+            return light;
+        }
+        if met.reflector.lobe(outgoing).width < FOLLOWED {
+            let turn = unit(hash(seed, 12));
+            for i in 0..LOBE_RAYS {
+                let u = point2(hash(seed, 13), i);
+                let u = Vec2::new((u.x + turn).fract(), (u.y + i as f32) / LOBE_RAYS as f32).fract();
+                if let Some(sample) = met.reflector.sample(outgoing, u) {
+                    let direction = place.frame * sample.incident;
+                    let seen = self.along(met, direction, bounce, hash(seed, 14 + i), scratch);
+                    light += sample.weight * seen / LOBE_RAYS as f32;
+                }
+            }
+            return light;
+        }
+        let path = self.solution.incident_path(met.leaf);
+        arriving(&self.solution.elements, met.leaf, &path, &place, scratch);
+        light + met.reflector.reflect_sum(scratch, outgoing)
+    }
+
+    /// What is seen from a point along a direction; nothing below the surface.
+    fn along(&self, met: &Met, direction: Vec3, bounce: u32, seed: u32, scratch: &mut Vec<Incident>) -> Rgb {
+        let side = if met.hit.front { 1.0 } else { -1.0 };
+        if direction.dot(met.hit.normal) * side <= 0.0 {
+            return Rgb::ZERO;
+        }
+        self.radiance(met.hit.point, direction, met.hit.surface, bounce + 1, seed, scratch)
+    }
+}
+
+/// Number of leaves that take part in glossy reflection.
+#[must_use]
+pub fn glossy_leaves(solution: &Solution<GlossyField>) -> usize {
+    let nodes = &solution.elements;
+    nodes.patch_leaves().filter(|&leaf| nodes.nodes[leaf as usize].active && nodes.area(NodeId(leaf)) > 0.0).count()
+}
