@@ -56,9 +56,7 @@ pub struct DisplayMesh {
 #[non_exhaustive]
 pub enum MeshError {
     /// A per-vertex array is shorter or longer than `positions`.
-    #[error(
-        "display mesh: {array} has {found} entries for {expected} vertices; give one per vertex"
-    )]
+    #[error("display mesh: {array} has {found} entries for {expected} vertices; give one per vertex")]
     Length {
         /// Which array.
         array: &'static str,
@@ -80,9 +78,7 @@ pub enum MeshError {
         limit: usize,
     },
     /// A batch is not a range of whole triangles of `indices`.
-    #[error(
-        "display mesh: batch {at} covers indices {start}..{end} of {limit}; must be whole triangles within them"
-    )]
+    #[error("display mesh: batch {at} covers indices {start}..{end} of {limit}; must be whole triangles within them")]
     Batch {
         /// Which batch.
         at: usize,
@@ -92,20 +88,6 @@ pub enum MeshError {
         end: u32,
         /// The number of indices.
         limit: usize,
-    },
-    /// A texture's texels do not fill its width and height.
-    #[error(
-        "display mesh: texture {at} has {found} texels for {width} × {height}; give width · height, at least one"
-    )]
-    Texels {
-        /// Which texture.
-        at: usize,
-        /// The number of texels.
-        found: usize,
-        /// Width in texels.
-        width: u32,
-        /// Height in texels.
-        height: u32,
     },
     /// A position is infinite or not a number.
     #[error("display mesh: vertex {at} lies at infinity; positions must be finite")]
@@ -130,11 +112,7 @@ impl DisplayMesh {
             ("uv", self.uv.len()),
         ] {
             if found != expected {
-                return Err(MeshError::Length {
-                    array,
-                    found,
-                    expected,
-                });
+                return Err(MeshError::Length { array, found, expected });
             }
         }
         if let Some(at) = self.positions.iter().position(|p| !p.is_finite()) {
@@ -142,46 +120,16 @@ impl DisplayMesh {
         }
         for (array, list) in [("indices", &self.indices), ("glossy", &self.glossy)] {
             if let Some(at) = list.iter().position(|&i| i as usize >= expected) {
-                return Err(MeshError::Index {
-                    array,
-                    at,
-                    found: list[at],
-                    limit: expected,
-                });
+                return Err(MeshError::Index { array, at, found: list[at], limit: expected });
             }
         }
         for (at, batch) in self.batches.iter().enumerate() {
             let (Range { start, end }, limit) = (batch.indices.clone(), self.indices.len());
             if start > end || end as usize > limit || start % 3 != 0 || end % 3 != 0 {
-                return Err(MeshError::Batch {
-                    at,
-                    start,
-                    end,
-                    limit,
-                });
+                return Err(MeshError::Batch { at, start, end, limit });
             }
             if let Some(found) = batch.texture.filter(|&t| t as usize >= self.textures.len()) {
-                return Err(MeshError::Index {
-                    array: "batches",
-                    at,
-                    found,
-                    limit: self.textures.len(),
-                });
-            }
-        }
-        for (at, texture) in self.textures.iter().enumerate() {
-            let (width, height, found) = (
-                texture.texels.width,
-                texture.texels.height,
-                texture.texels.data.len(),
-            );
-            if found == 0 || u64::from(width) * u64::from(height) != found as u64 {
-                return Err(MeshError::Texels {
-                    at,
-                    found,
-                    width,
-                    height,
-                });
+                return Err(MeshError::Index { array: "batches", at, found, limit: self.textures.len() });
             }
         }
         Ok(())
@@ -193,9 +141,7 @@ impl DisplayMesh {
         let Some(&first) = self.positions.first() else {
             return (Vec3::ZERO, Vec3::ZERO);
         };
-        self.positions
-            .iter()
-            .fold((first, first), |(low, high), &p| (low.min(p), high.max(p)))
+        self.positions.iter().fold((first, first), |(low, high), &p| (low.min(p), high.max(p)))
     }
 
     /// Length of the diagonal of [`bounds`](Self::bounds) in scene units.
@@ -226,11 +172,7 @@ pub trait Walkable: Send + Sync {
     /// The direction that stays up while walking, unit length: by default the coordinate axis nearest to the first
     /// camera's up, and z without a camera.
     fn up(&self) -> DVec3 {
-        nearest_axis(
-            self.cameras()
-                .first()
-                .map_or(DVec3::Z, |(_, camera)| DVec3::from(camera.up)),
-        )
+        nearest_axis(self.cameras().first().map_or(DVec3::Z, |(_, camera)| DVec3::from(camera.up)))
     }
 
     /// Radiance (W/(m² sr)) toward an eye (in scene units), beside the diffuse part and emission. `vertices` are
@@ -245,28 +187,13 @@ fn nearest_axis(v: DVec3) -> DVec3 {
         return DVec3::Z;
     }
     // The positive ones first, so that ties do not turn a scene upside down.
-    let axes = [
-        DVec3::Z,
-        DVec3::Y,
-        DVec3::X,
-        DVec3::NEG_Z,
-        DVec3::NEG_Y,
-        DVec3::NEG_X,
-    ];
-    axes.into_iter().fold(DVec3::Z, |best, axis| {
-        if axis.dot(v) > best.dot(v) {
-            axis
-        } else {
-            best
-        }
-    })
+    let axes = [DVec3::Z, DVec3::Y, DVec3::X, DVec3::NEG_Z, DVec3::NEG_Y, DVec3::NEG_X];
+    axes.into_iter().fold(DVec3::Z, |best, axis| if axis.dot(v) > best.dot(v) { axis } else { best })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hr_scene::scene::Texels;
-    use std::sync::Arc;
 
     fn triangle() -> DisplayMesh {
         DisplayMesh {
@@ -277,10 +204,7 @@ mod tests {
             emission: vec![Rgb::ZERO; 3],
             uv: vec![Vec2::ZERO; 3],
             indices: vec![0, 1, 2],
-            batches: vec![Batch {
-                indices: 0..3,
-                texture: None,
-            }],
+            batches: vec![Batch { indices: 0..3, texture: None }],
             glossy: vec![1],
             ..DisplayMesh::default()
         }
@@ -289,110 +213,41 @@ mod tests {
     #[test]
     fn a_sound_mesh_passes() {
         assert_eq!(triangle().check(), Ok(()), "a single triangle is sound");
-        assert_eq!(
-            DisplayMesh::default().check(),
-            Ok(()),
-            "nothing at all is sound too"
-        );
-        assert!(
-            (triangle().diagonal() - 2.0_f32.sqrt()).abs() < 1e-6,
-            "diagonal of the unit square"
-        );
+        assert_eq!(DisplayMesh::default().check(), Ok(()), "nothing at all is sound too");
+        assert!((triangle().diagonal() - 2.0_f32.sqrt()).abs() < 1e-6, "diagonal of the unit square");
     }
 
     #[test]
     fn what_does_not_fit_is_named() {
         let mut mesh = triangle();
         mesh.tint.pop();
-        assert!(
-            matches!(mesh.check(), Err(MeshError::Length { array: "tint", .. })),
-            "short array"
-        );
+        assert!(matches!(mesh.check(), Err(MeshError::Length { array: "tint", .. })), "short array");
 
         let mut mesh = triangle();
         mesh.indices[1] = 3;
-        assert!(
-            matches!(
-                mesh.check(),
-                Err(MeshError::Index {
-                    array: "indices",
-                    at: 1,
-                    ..
-                })
-            ),
-            "index beyond the end"
-        );
+        assert!(matches!(mesh.check(), Err(MeshError::Index { array: "indices", at: 1, .. })), "index beyond the end");
 
         let mut mesh = triangle();
         mesh.glossy[0] = 9;
-        assert!(
-            matches!(
-                mesh.check(),
-                Err(MeshError::Index {
-                    array: "glossy",
-                    ..
-                })
-            ),
-            "glossy vertex beyond the end"
-        );
+        assert!(matches!(mesh.check(), Err(MeshError::Index { array: "glossy", .. })), "glossy vertex beyond the end");
 
         let mut mesh = triangle();
         mesh.batches[0].indices = 0..4;
-        assert!(
-            matches!(mesh.check(), Err(MeshError::Batch { .. })),
-            "part of a triangle"
-        );
+        assert!(matches!(mesh.check(), Err(MeshError::Batch { .. })), "part of a triangle");
 
         let mut mesh = triangle();
         mesh.batches[0].texture = Some(0);
-        assert!(
-            matches!(
-                mesh.check(),
-                Err(MeshError::Index {
-                    array: "batches",
-                    ..
-                })
-            ),
-            "texture that is not there"
-        );
-
-        let mut mesh = triangle();
-        let texels = Arc::new(Texels {
-            width: 2,
-            height: 2,
-            data: vec![Rgb::ONE; 3],
-        });
-        mesh.textures.push(Texture {
-            texels,
-            transform: glam::Mat3::IDENTITY,
-            wrap: Default::default(),
-        });
-        assert!(
-            matches!(mesh.check(), Err(MeshError::Texels { found: 3, .. })),
-            "missing texel"
-        );
+        assert!(matches!(mesh.check(), Err(MeshError::Index { array: "batches", .. })), "texture that is not there");
 
         let mut mesh = triangle();
         mesh.positions[2].x = f32::NAN;
-        assert_eq!(
-            mesh.check(),
-            Err(MeshError::NotFinite { at: 2 }),
-            "no place"
-        );
+        assert_eq!(mesh.check(), Err(MeshError::NotFinite { at: 2 }), "no place");
     }
 
     #[test]
     fn up_snaps_to_an_axis() {
-        assert_eq!(
-            nearest_axis(DVec3::new(0.1, 0.9, -0.3)),
-            DVec3::Y,
-            "tilted y"
-        );
-        assert_eq!(
-            nearest_axis(DVec3::new(0.0, -0.2, -2.0)),
-            DVec3::NEG_Z,
-            "upside down"
-        );
+        assert_eq!(nearest_axis(DVec3::new(0.1, 0.9, -0.3)), DVec3::Y, "tilted y");
+        assert_eq!(nearest_axis(DVec3::new(0.0, -0.2, -2.0)), DVec3::NEG_Z, "upside down");
         assert_eq!(nearest_axis(DVec3::splat(f64::NAN)), DVec3::Z, "nonsense");
     }
 }

@@ -34,10 +34,7 @@ pub struct WindowOptions {
 
 impl Default for WindowOptions {
     fn default() -> Self {
-        Self {
-            size: [1280, 800],
-            tolerance: 0.0,
-        }
+        Self { size: [1280, 800], tolerance: 0.0 }
     }
 }
 
@@ -46,24 +43,16 @@ impl Default for WindowOptions {
 #[non_exhaustive]
 pub enum WindowError {
     /// There is no screen to open a window on. Draw frames instead.
-    #[error(
-        "no window can be opened here ({0}); run in a graphical session, or use --frames or --image"
-    )]
+    #[error("no window can be opened here ({0}); run in a graphical session, or use --frames or --image")]
     NoDisplay(String),
     /// There is no graphics device. Draw frames instead.
-    #[error(
-        "no graphics device for the window ({0}); install a Vulkan or OpenGL driver, or use --frames or --image"
-    )]
+    #[error("no graphics device for the window ({0}); install a Vulkan or OpenGL driver, or use --frames or --image")]
     NoAdapter(String),
     /// The graphics device failed.
-    #[error(
-        "the graphics device failed: {0}; close other programs that use it, or use --frames or --image"
-    )]
+    #[error("the graphics device failed: {0}; close other programs that use it, or use --frames or --image")]
     Device(String),
     /// Mesh or picture do not fit the graphics device.
-    #[error(
-        "the graphics device holds at most {limit} of {size} bytes or pixels; ask for a coarser solution or less"
-    )]
+    #[error("the graphics device holds at most {limit} of {size} bytes or pixels; ask for a coarser solution or less")]
     TooLarge {
         /// What is needed.
         size: u64,
@@ -110,10 +99,7 @@ fn event_loop() -> Result<EventLoop<()>, WindowError> {
         Err(panic) => {
             let text = panic.downcast_ref::<String>().map(String::as_str);
             let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-            Err(WindowError::NoDisplay(
-                text.unwrap_or("the window system could not be reached")
-                    .replace('\n', " "),
-            ))
+            Err(WindowError::NoDisplay(text.unwrap_or("the window system could not be reached").replace('\n', " ")))
         }
     }
 }
@@ -121,11 +107,6 @@ fn event_loop() -> Result<EventLoop<()>, WindowError> {
 /// What the window system says, without the place in winit's source that it begins with.
 fn reason(error: &dyn std::error::Error) -> String {
     let text = gpu::one_line(error);
-    let after = text
-        .split_once(".rs:")
-        .map(|(_, rest)| rest.trim_start_matches(|c: char| c.is_ascii_digit()));
-    after
-        .map_or(text.as_str(), |rest| rest.trim_start_matches(": "))
-        .trim_end_matches('.')
-        .to_owned()
+    let after = text.split_once(".rs:").map(|(_, rest)| rest.trim_start_matches(|c: char| c.is_ascii_digit()));
+    after.map_or(text.as_str(), |rest| rest.trim_start_matches(": ")).trim_end_matches('.').to_owned()
 }

@@ -33,23 +33,15 @@ struct Stripes {
 
 impl Stripes {
     fn new(colors: Vec<Rgb>, primaries: Primaries) -> Self {
-        let mut mesh = DisplayMesh {
-            primaries,
-            ..DisplayMesh::default()
-        };
+        let mut mesh = DisplayMesh { primaries, ..DisplayMesh::default() };
         for (i, &color) in (0_u16..).zip(&colors) {
             let first = 4 * u32::from(i);
             let is_glossy = i % 2 == 1;
             for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
-                mesh.positions
-                    .push(Vec3::new(f32::from(i) + dx, dy * 4.0, 0.0));
+                mesh.positions.push(Vec3::new(f32::from(i) + dx, dy * 4.0, 0.0));
                 mesh.normals.push(Vec3::Z);
                 // Split between its terms, so that a missing one shows.
-                mesh.irradiance.push(if is_glossy {
-                    Rgb::ZERO
-                } else {
-                    color * 0.75 * std::f32::consts::PI
-                });
+                mesh.irradiance.push(if is_glossy { Rgb::ZERO } else { color * 0.75 * std::f32::consts::PI });
                 mesh.tint.push(Rgb::splat(std::f32::consts::FRAC_1_PI));
                 mesh.emission.push(color * 0.25);
                 mesh.uv.push(Vec2::ZERO);
@@ -59,10 +51,7 @@ impl Stripes {
                 mesh.glossy.extend(first..first + 4);
             }
         }
-        mesh.batches = vec![Batch {
-            indices: 0..u32::try_from(mesh.indices.len()).expect("small"),
-            texture: None,
-        }];
+        mesh.batches = vec![Batch { indices: 0..u32::try_from(mesh.indices.len()).expect("small"), texture: None }];
         Self { mesh, colors }
     }
 
@@ -98,17 +87,8 @@ impl Walkable for Stripes {
 }
 
 fn colors() -> Vec<Rgb> {
-    let mut colors: Vec<Rgb> = (0..10_i16)
-        .map(|i| Rgb::splat(0.002 * 3.0_f32.powf(f32::from(i))))
-        .collect();
-    colors.extend([
-        Rgb::X,
-        Rgb::Y,
-        Rgb::Z,
-        Rgb::new(0.3, 0.02, 0.5),
-        Rgb::ZERO,
-        Rgb::splat(1e30),
-    ]);
+    let mut colors: Vec<Rgb> = (0..10_i16).map(|i| Rgb::splat(0.002 * 3.0_f32.powf(f32::from(i)))).collect();
+    colors.extend([Rgb::X, Rgb::Y, Rgb::Z, Rgb::new(0.3, 0.02, 0.5), Rgb::ZERO, Rgb::splat(1e30)]);
     colors
 }
 
@@ -116,10 +96,7 @@ fn colors() -> Vec<Rgb> {
 fn every_pixel_follows_the_formula() {
     for primaries in [Primaries::Radiance, Primaries::Rec709] {
         let wall = Stripes::new(colors(), primaries);
-        let tone = Tone {
-            exposure: 0.7,
-            ..Tone::for_mesh(wall.mesh())
-        };
+        let tone = Tone { exposure: 0.7, ..Tone::for_mesh(wall.mesh()) };
         let Some(picture) = draw(&wall, &wall.camera(5.0), Some(&tone)) else {
             return;
         };
@@ -129,10 +106,7 @@ fn every_pixel_follows_the_formula() {
             for c in 0..3 {
                 // Rounding to 8 bits is half a code; devices may encode half a code off at most.
                 let off = (f32::from(found[c]) - expected[c]).abs();
-                assert!(
-                    off <= 1.01,
-                    "{primaries:?} stripe {i} ({color}): {found:?} for {expected}"
-                );
+                assert!(off <= 1.01, "{primaries:?} stripe {i} ({color}): {found:?} for {expected}");
             }
         }
     }
@@ -142,15 +116,8 @@ fn every_pixel_follows_the_formula() {
 fn other_curves_come_through_the_uniforms() {
     let wall = Stripes::new(colors(), Primaries::Rec709);
     // x / (1 + x)
-    let curve = Curve {
-        numerator: [0.0, 1.0],
-        denominator: [0.0, 1.0, 1.0],
-    };
-    let tone = Tone {
-        exposure: 2.0,
-        to_srgb: Mat3::IDENTITY,
-        curve,
-    };
+    let curve = Curve { numerator: [0.0, 1.0], denominator: [0.0, 1.0, 1.0] };
+    let tone = Tone { exposure: 2.0, to_srgb: Mat3::IDENTITY, curve };
     let Some(picture) = draw(&wall, &wall.camera(5.0), Some(&tone)) else {
         return;
     };
@@ -166,11 +133,7 @@ fn back_faces_are_not_seen() {
     let Some(picture) = draw(&wall, &wall.camera(-5.0), None) else {
         return;
     };
-    let lit = picture
-        .rgba
-        .chunks(4)
-        .filter(|p| p[..3] != [0, 0, 0])
-        .count();
+    let lit = picture.rgba.chunks(4).filter(|p| p[..3] != [0, 0, 0]).count();
     assert_eq!(lit, 0, "the wall has no back");
 }
 
@@ -186,26 +149,25 @@ fn the_room_far_from_zero_is_where_it_should_be() {
     }
     let (left, right) = (pixel(&picture, 20, 200), pixel(&picture, 619, 200));
     // Looking along +x with z up, the wall y = 3 is on the left.
-    assert!(
-        left[2] > left[0] + 30,
-        "the left wall is blue, not {left:?}"
-    );
-    assert!(
-        right[0] > right[2] + 30,
-        "the right wall is red, not {right:?}"
-    );
+    assert!(left[2] > left[0] + 30, "the left wall is blue, not {left:?}");
+    assert!(right[0] > right[2] + 30, "the right wall is red, not {right:?}");
     // The texture repeats twice: 16 checks across the far wall, dark and light.
-    let row: Vec<bool> = (220..420)
-        .map(|x| pixel(&picture, x, 190)[0] > 128)
-        .collect();
+    let row: Vec<bool> = (220..420).map(|x| pixel(&picture, x, 190)[0] > 128).collect();
     let edges = row.windows(2).filter(|w| w[0] != w[1]).count();
     assert!(edges >= 8, "only {edges} edges between the checks");
-    let highlight = (0..640)
-        .flat_map(|x| (300..400).map(move |y| (x, y)))
-        .map(|(x, y)| pixel(&picture, x, y)[0]);
-    let floor = pixel(&picture, 320, 396)[0];
-    assert!(
-        highlight.max().unwrap_or(0) > floor.saturating_add(40),
-        "no highlight on the floor"
-    );
+}
+
+#[test]
+fn the_highlight_follows_the_eye() {
+    let room = room::Room::new(64);
+    let (_, camera) = &room.cameras()[2];
+    let Some(picture) = draw(&room, camera, None) else { return };
+    let highlight = pixel(&picture, 320, 200)[0];
+    let beside = pixel(&picture, 320, 20)[0];
+    assert!(highlight > beside + 60, "the middle of the picture is {highlight}, the floor beyond it {beside}");
+    let mut aside = *camera;
+    aside.eye[1] += 0.8;
+    let Some(picture) = draw(&room, &aside, None) else { return };
+    let found = pixel(&picture, 320, 200)[0];
+    assert!(found < highlight - 30, "seen from aside the same point is {found}, was {highlight}");
 }

@@ -19,13 +19,7 @@ fn main() -> ExitCode {
     let asked = |name: &str| arguments.iter().any(|a| a == name);
     if asked("--open") {
         let fineness = arguments.iter().find_map(|a| a.parse().ok()).unwrap_or(64);
-        return match open(
-            &room::Room::new(fineness),
-            &WindowOptions {
-                size: [800, 500],
-                tolerance: 0.0,
-            },
-        ) {
+        return match open(&room::Room::new(fineness), &WindowOptions { size: [800, 500], tolerance: 0.0 }) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
                 eprintln!("{error}");
@@ -36,26 +30,19 @@ fn main() -> ExitCode {
     if asked("--list") {
         return ExitCode::SUCCESS;
     }
-    let mut failed = report(
-        "no_screen_is_an_error_at_once",
-        no_screen_is_an_error_at_once(),
-    );
+    let mut failed = report("no_screen_is_an_error_at_once", &no_screen_is_an_error_at_once());
     if !(asked("--ignored") || asked("--include-ignored")) {
         eprintln!("test a_walk_on_a_virtual_screen ... skipped; ask for it with -- --ignored");
     } else if ["Xvfb", "xdotool"].iter().any(|tool| !is_installed(tool)) {
         eprintln!("test a_walk_on_a_virtual_screen ... skipped; it needs Xvfb and xdotool");
     } else {
-        failed |= report("a_walk_on_a_virtual_screen", a_walk_on_a_virtual_screen());
+        failed |= report("a_walk_on_a_virtual_screen", &a_walk_on_a_virtual_screen());
     }
-    if failed {
-        ExitCode::FAILURE
-    } else {
-        ExitCode::SUCCESS
-    }
+    if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS }
 }
 
-fn report(name: &str, outcome: Outcome) -> bool {
-    match &outcome {
+fn report(name: &str, outcome: &Outcome) -> bool {
+    match outcome {
         Ok(()) => eprintln!("test {name} ... ok"),
         Err(error) => eprintln!("test {name} ... FAILED: {error}"),
     }
@@ -95,10 +82,7 @@ fn no_screen_is_an_error_at_once() -> Outcome {
     if !cfg!(all(unix, not(target_os = "macos"))) {
         return Ok(());
     }
-    for (display, what) in [
-        (None, "no DISPLAY"),
-        (Some(":4095"), "a DISPLAY that nobody serves"),
-    ] {
+    for (display, what) in [(None, "no DISPLAY"), (Some(":4095"), "a DISPLAY that nobody serves")] {
         let mut command = Command::new(std::env::current_exe()?);
         command.arg("--open").stderr(Stdio::piped());
         for name in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
@@ -133,15 +117,7 @@ struct Stage {
 impl Stage {
     fn new() -> Result<Self, Box<dyn Error>> {
         let mut server = Command::new("Xvfb")
-            .args([
-                "-displayfd",
-                "1",
-                "-screen",
-                "0",
-                "1280x800x24",
-                "-nolisten",
-                "tcp",
-            ])
+            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()?;
@@ -153,30 +129,17 @@ impl Stage {
         let folder = std::env::temp_dir().join(format!("hr-view-walk-{}", std::process::id()));
         std::fs::create_dir_all(&folder)?;
         let mut command = Command::new(std::env::current_exe()?);
-        command
-            .args(["--open", "32"])
-            .current_dir(&folder)
-            .env("DISPLAY", &display);
-        command
-            .env_remove("WAYLAND_DISPLAY")
-            .env_remove("WAYLAND_SOCKET");
+        command.args(["--open", "32"]).current_dir(&folder).env("DISPLAY", &display);
+        command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
         let child = Running(command.spawn()?);
-        let mut stage = Self {
-            display,
-            window: String::new(),
-            folder,
-            child,
-            _server: server,
-        };
+        let mut stage = Self { display, window: String::new(), folder, child, _server: server };
         let begin = Instant::now();
         while stage.window.is_empty() {
             if begin.elapsed() > Duration::from_secs(60) || stage.child.0.try_wait()?.is_some() {
                 return Err("no window opened".into());
             }
             std::thread::sleep(Duration::from_millis(100));
-            let found = stage
-                .xdotool(&["search", "--onlyvisible", "--name", "room"])
-                .unwrap_or_default();
+            let found = stage.xdotool(&["search", "--onlyvisible", "--name", "room"]).unwrap_or_default();
             stage.window = found.lines().next().unwrap_or_default().to_owned();
         }
         let window = stage.window.clone();
@@ -185,16 +148,9 @@ impl Stage {
     }
 
     fn xdotool(&self, arguments: &[&str]) -> Result<String, Box<dyn Error>> {
-        let output = Command::new("xdotool")
-            .args(arguments)
-            .env("DISPLAY", &self.display)
-            .output()?;
+        let output = Command::new("xdotool").args(arguments).env("DISPLAY", &self.display).output()?;
         if !output.status.success() {
-            return Err(format!(
-                "xdotool {arguments:?}: {}",
-                String::from_utf8_lossy(&output.stderr)
-            )
-            .into());
+            return Err(format!("xdotool {arguments:?}: {}", String::from_utf8_lossy(&output.stderr)).into());
         }
         std::thread::sleep(Duration::from_millis(300));
         Ok(String::from_utf8(output.stdout)?)
@@ -227,12 +183,7 @@ fn is_complete(path: &Path) -> bool {
 
 /// Mean difference per channel, 0…255.
 fn difference(a: &image::RgbImage, b: &image::RgbImage) -> f64 {
-    let sum: u64 = a
-        .as_raw()
-        .iter()
-        .zip(b.as_raw())
-        .map(|(x, y)| u64::from(x.abs_diff(*y)))
-        .sum();
+    let sum: u64 = a.as_raw().iter().zip(b.as_raw()).map(|(x, y)| u64::from(x.abs_diff(*y))).sum();
     sum as f64 / a.as_raw().len() as f64
 }
 
@@ -248,18 +199,7 @@ fn a_walk_on_a_virtual_screen() -> Outcome {
     if difference(&start, &ahead) < 1.0 {
         return Err("W does not move".into());
     }
-    stage.xdotool(&[
-        "mousemove",
-        "600",
-        "300",
-        "mousedown",
-        "1",
-        "mousemove",
-        "500",
-        "320",
-        "mouseup",
-        "1",
-    ])?;
+    stage.xdotool(&["mousemove", "600", "300", "mousedown", "1", "mousemove", "500", "320", "mouseup", "1"])?;
     if difference(&ahead, &stage.screenshot(3)?) < 1.0 {
         return Err("dragging does not turn".into());
     }
@@ -280,9 +220,5 @@ fn a_walk_on_a_virtual_screen() -> Outcome {
         return Err(format!("after resizing the picture is {:?}", resized.dimensions()).into());
     }
     stage.xdotool(&["key", "Escape"])?;
-    if stage.child.exit_within(Duration::from_secs(20))? {
-        Ok(())
-    } else {
-        Err("the exit status is not 0".into())
-    }
+    if stage.child.exit_within(Duration::from_secs(20))? { Ok(()) } else { Err("the exit status is not 0".into()) }
 }

@@ -16,9 +16,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
 use winit::dpi::{LogicalSize, PhysicalPosition};
-use winit::event::{
-    DeviceEvent, DeviceId, ElementState, MouseButton, MouseScrollDelta, WindowEvent,
-};
+use winit::event::{DeviceEvent, DeviceId, ElementState, MouseButton, MouseScrollDelta, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::keyboard::{Key, KeyCode, NamedKey, PhysicalKey};
 use winit::window::{CursorGrabMode, Window, WindowId};
@@ -56,12 +54,7 @@ pub(super) struct App<'a> {
 
 impl<'a> App<'a> {
     pub(super) fn new(walk: &'a dyn Walkable, options: WindowOptions) -> Self {
-        Self {
-            walk,
-            options,
-            live: None,
-            failure: None,
-        }
+        Self { walk, options, live: None, failure: None }
     }
 
     /// The error that ended the walk, if any.
@@ -70,11 +63,7 @@ impl<'a> App<'a> {
     }
 
     /// Runs a step of the open window; ends the walk where it fails.
-    fn step(
-        &mut self,
-        event_loop: &ActiveEventLoop,
-        step: impl FnOnce(&mut Live<'a>) -> Result<Next, WindowError>,
-    ) {
+    fn step(&mut self, event_loop: &ActiveEventLoop, step: impl FnOnce(&mut Live<'a>) -> Result<Next, WindowError>) {
         let Some(live) = &mut self.live else { return };
         match step(live) {
             Ok(Next::Go) => {}
@@ -184,20 +173,14 @@ struct Live<'a> {
 }
 
 impl<'a> Live<'a> {
-    fn new(
-        walk: &'a dyn Walkable,
-        options: WindowOptions,
-        event_loop: &ActiveEventLoop,
-    ) -> Result<Self, WindowError> {
+    fn new(walk: &'a dyn Walkable, options: WindowOptions, event_loop: &ActiveEventLoop) -> Result<Self, WindowError> {
         let [width, height] = options.size.map(|side| side.clamp(64, 16_384));
         let attributes = Window::default_attributes()
             .with_title(format!("{} — hr-view", walk.name()))
             .with_inner_size(LogicalSize::new(width, height))
             // Shown when there is something to show: failing leaves no flash of a window behind.
             .with_visible(false);
-        let window = event_loop
-            .create_window(attributes)
-            .map_err(|e| WindowError::NoDisplay(reason(&e)))?;
+        let window = event_loop.create_window(attributes).map_err(|e| WindowError::NoDisplay(reason(&e)))?;
         let window = Arc::new(window);
         let (gpu, surface) = Gpu::with_surface(&window, &event_loop.owned_display_handle())?;
         let config = configuration(&gpu, &surface, &window)?;
@@ -208,11 +191,7 @@ impl<'a> Live<'a> {
         gpu.fault()?;
         let info = gpu.adapter.get_info();
         let walker = Walker::new(walk);
-        let tolerance = if options.tolerance.is_finite() {
-            options.tolerance.to_degrees().max(0.0)
-        } else {
-            0.0
-        };
+        let tolerance = if options.tolerance.is_finite() { options.tolerance.to_degrees().max(0.0) } else { 0.0 };
         let live = Self {
             walk,
             refresh: Refresh::new(walk, &lists[1]),
@@ -220,11 +199,7 @@ impl<'a> Live<'a> {
             evaluation: Duration::ZERO,
             computed_for: None,
             hud: Hud::new(&gpu, &window, config.format),
-            settings: Settings {
-                stops: 0.0,
-                tolerance,
-                fov_x: walker.view.fov_x,
-            },
+            settings: Settings { stops: 0.0, tolerance, fov_x: walker.view.fov_x },
             automatic: Tone::for_mesh(mesh),
             camera: (!walk.cameras().is_empty()).then_some(0),
             walker,
@@ -233,12 +208,7 @@ impl<'a> Live<'a> {
             last_frame: None,
             frame_time: Duration::ZERO,
             again: None,
-            device: format!(
-                "{} ({:?}), {} samples a pixel",
-                info.name,
-                info.backend,
-                pass.samples()
-            ),
+            device: format!("{} ({:?}), {} samples a pixel", info.name, info.backend, pass.samples()),
             window,
             surface,
             gpu,
@@ -263,23 +233,16 @@ impl<'a> Live<'a> {
             WindowEvent::RedrawRequested => self.redraw()?,
             WindowEvent::Resized(size) => {
                 let limit = self.gpu.device.limits().max_texture_dimension_2d;
-                (self.config.width, self.config.height) =
-                    (size.width.min(limit), size.height.min(limit));
+                (self.config.width, self.config.height) = (size.width.min(limit), size.height.min(limit));
                 self.configure();
                 self.window.request_redraw();
             }
-            WindowEvent::ScaleFactorChanged { .. } | WindowEvent::Occluded(false) => {
-                self.window.request_redraw()
-            }
+            WindowEvent::ScaleFactorChanged { .. } | WindowEvent::Occluded(false) => self.window.request_redraw(),
             WindowEvent::Focused(false) => {
                 self.walker.release();
                 self.set_mouse(Mouse::Free);
             }
-            WindowEvent::KeyboardInput {
-                event,
-                is_synthetic: false,
-                ..
-            } if !taken || !event.state.is_pressed() => {
+            WindowEvent::KeyboardInput { event, is_synthetic: false, .. } if !taken || !event.state.is_pressed() => {
                 let PhysicalKey::Code(code) = event.physical_key else {
                     return Ok(Next::Go);
                 };
@@ -289,9 +252,7 @@ impl<'a> Live<'a> {
                     return self.command(code, &event.logical_key, event.repeat);
                 }
             }
-            WindowEvent::MouseInput { state, button, .. } => {
-                self.mouse_button(*state, *button, taken)
-            }
+            WindowEvent::MouseInput { state, button, .. } => self.mouse_button(*state, *button, taken),
             WindowEvent::CursorMoved { position, .. } => self.drag(*position),
             WindowEvent::CursorLeft { .. } if self.mouse != Mouse::Dragging => self.cursor = None,
             WindowEvent::MouseWheel { delta, .. } if !taken => {
@@ -299,8 +260,7 @@ impl<'a> Live<'a> {
                     MouseScrollDelta::LineDelta(_, y) => f64::from(*y),
                     MouseScrollDelta::PixelDelta(p) => p.y / NOTCH,
                 });
-                self.hud
-                    .say(format!("walking speed {:.3} units/s", self.walker.speed()));
+                self.hud.say(format!("walking speed {:.3} units/s", self.walker.speed()));
                 self.window.request_redraw();
             }
             _ => {}
@@ -341,8 +301,7 @@ impl<'a> Live<'a> {
             }
             None => {
                 let count = self.walk.cameras().len();
-                self.hud
-                    .say(format!("no camera {}; the scene has {count}", index + 1));
+                self.hud.say(format!("no camera {}; the scene has {count}", index + 1));
             }
         }
     }
@@ -365,18 +324,13 @@ impl<'a> Live<'a> {
         let last = self.cursor.replace(position);
         if let (Mouse::Dragging, Some(last)) = (self.mouse, last) {
             let turn = self.walker.view.fov_x.to_radians() / f64::from(self.config.width.max(1));
-            self.walker
-                .turn((position.x - last.x) * turn, (last.y - position.y) * turn);
+            self.walker.turn((position.x - last.x) * turn, (last.y - position.y) * turn);
             self.window.request_redraw();
         }
     }
 
     fn toggle_capture(&mut self) {
-        let wanted = if self.mouse == Mouse::Captured {
-            Mouse::Free
-        } else {
-            Mouse::Captured
-        };
+        let wanted = if self.mouse == Mouse::Captured { Mouse::Free } else { Mouse::Captured };
         self.set_mouse(wanted);
     }
 
@@ -384,13 +338,8 @@ impl<'a> Live<'a> {
         if wanted == Mouse::Captured {
             // X11 can only confine, Wayland and macOS only lock.
             let grab = self.window.set_cursor_grab(CursorGrabMode::Locked);
-            if let Err(error) =
-                grab.or_else(|_| self.window.set_cursor_grab(CursorGrabMode::Confined))
-            {
-                self.hud.say(format!(
-                    "the mouse cannot be captured here ({}); drag instead",
-                    reason(&error)
-                ));
+            if let Err(error) = grab.or_else(|_| self.window.set_cursor_grab(CursorGrabMode::Confined)) {
+                self.hud.say(format!("the mouse cannot be captured here ({}); drag instead", reason(&error)));
                 self.window.request_redraw();
                 return;
             }
@@ -404,10 +353,7 @@ impl<'a> Live<'a> {
     }
 
     fn tone(&self) -> Tone {
-        Tone {
-            exposure: self.automatic.exposure * self.settings.stops.exp2(),
-            ..self.automatic
-        }
+        Tone { exposure: self.automatic.exposure * self.settings.stops.exp2(), ..self.automatic }
     }
 
     /// Applies the configuration, unless the window is minimised.
@@ -429,12 +375,7 @@ impl<'a> Live<'a> {
             self.frame_time = begin - last;
         } else {
             // The first frame of a movement has no predecessor to measure from; a step makes the key feel at once.
-            self.walker
-                .advance(Duration::from_millis(if self.walker.is_moving() {
-                    10
-                } else {
-                    0
-                }));
+            self.walker.advance(Duration::from_millis(if self.walker.is_moving() { 10 } else { 0 }));
         }
         self.walker.view.fov_x = self.settings.fov_x;
         self.refresh_glossy(size);
@@ -443,10 +384,7 @@ impl<'a> Live<'a> {
         };
         let facts = Facts {
             scene: self.walk.name(),
-            camera: self
-                .camera
-                .and_then(|i| self.walk.cameras().get(i))
-                .map(|(name, _)| name.as_str()),
+            camera: self.camera.and_then(|i| self.walk.cameras().get(i)).map(|(name, _)| name.as_str()),
             triangles: self.walk.mesh().triangle_count(),
             vertices: self.walk.mesh().positions.len(),
             glossy: self.walk.mesh().glossy.len(),
@@ -458,22 +396,11 @@ impl<'a> Live<'a> {
         let before = self.settings;
         let layout = self.hud.layout(&self.window, &facts, &mut self.settings);
         self.again = layout.again;
-        let target = output
-            .texture
-            .create_view(&wgpu::TextureViewDescriptor::default());
-        let mut encoder = self
-            .gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let frame = Frame {
-            view: &self.walker.view,
-            tone: &self.tone(),
-            mesh: self.walk.mesh(),
-        };
-        self.pass
-            .draw(&self.gpu, &self.scene, &mut encoder, &target, size, &frame);
-        self.hud
-            .draw(&self.gpu, &mut encoder, &target, size, layout);
+        let target = output.texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let frame = Frame { view: &self.walker.view, tone: &self.tone(), mesh: self.walk.mesh() };
+        self.pass.draw(&self.gpu, &self.scene, &mut encoder, &target, size, &frame);
+        self.hud.draw(&self.gpu, &mut encoder, &target, size, layout);
         self.gpu.queue.submit([encoder.finish()]);
         self.window.pre_present_notify();
         self.gpu.queue.present(output);
@@ -499,14 +426,9 @@ impl<'a> Live<'a> {
         self.computed_for = Some(wanted);
         let begin = Instant::now();
         let view = &self.walker.view;
-        let sight = view.sight(
-            self.walk.mesh().origin,
-            f64::from(size[0]) / f64::from(size[1]),
-        );
+        let sight = view.sight(self.walk.mesh().origin, f64::from(size[0]) / f64::from(size[1]));
         let tolerance = self.settings.tolerance.to_radians();
-        self.refreshed =
-            self.refresh
-                .update(self.walk, &self.lists[1], view.eye, &sight, tolerance);
+        self.refreshed = self.refresh.update(self.walk, &self.lists[1], view.eye, &sight, tolerance);
         if self.refreshed.evaluated > 0 {
             self.scene.set_glossy(&self.gpu, self.refresh.radiance());
         }
@@ -549,15 +471,9 @@ impl<'a> Live<'a> {
             return Ok(());
         }
         self.refresh_glossy(size);
-        let frame = Frame {
-            view: &self.walker.view,
-            tone: &self.tone(),
-            mesh: self.walk.mesh(),
-        };
+        let frame = Frame { view: &self.walker.view, tone: &self.tone(), mesh: self.walk.mesh() };
         let picture = Snapshot::draw(&self.gpu, &self.scene, size, &frame)?;
-        let path = (1..)
-            .map(|n| PathBuf::from(format!("hr-view-{n:03}.png")))
-            .find(|path| !path.exists());
+        let path = (1..).map(|n| PathBuf::from(format!("hr-view-{n:03}.png"))).find(|path| !path.exists());
         let Some(path) = path else { return Ok(()) };
         match picture.save_png(&path) {
             Ok(()) => {
@@ -581,16 +497,11 @@ fn configuration(
     let size = window.inner_size();
     let formats = surface.get_capabilities(&gpu.adapter).formats;
     let wanted = [Bgra8Unorm, Rgba8Unorm, Bgra8UnormSrgb, Rgba8UnormSrgb];
-    let format = wanted
-        .into_iter()
-        .find(|f| formats.contains(f))
-        .or_else(|| formats.first().copied());
+    let format = wanted.into_iter().find(|f| formats.contains(f)).or_else(|| formats.first().copied());
     let limit = gpu.device.limits().max_texture_dimension_2d;
     let none = || WindowError::NoAdapter("it cannot draw on this window".into());
     let format = format.ok_or_else(none)?;
-    let config = surface
-        .get_default_config(&gpu.adapter, size.width, size.height)
-        .ok_or_else(none)?;
+    let config = surface.get_default_config(&gpu.adapter, size.width, size.height).ok_or_else(none)?;
     Ok(wgpu::SurfaceConfiguration {
         format,
         width: size.width.min(limit),

@@ -44,17 +44,11 @@ impl Gpu {
     }
 
     /// Another surface on the window, after the first was lost.
-    pub(super) fn surface(
-        &self,
-        window: &Arc<Window>,
-    ) -> Result<wgpu::Surface<'static>, WindowError> {
+    pub(super) fn surface(&self, window: &Arc<Window>) -> Result<wgpu::Surface<'static>, WindowError> {
         surface(&self.instance, window)
     }
 
-    fn open(
-        instance: wgpu::Instance,
-        surface: Option<&wgpu::Surface<'static>>,
-    ) -> Result<Self, WindowError> {
+    fn open(instance: wgpu::Instance, surface: Option<&wgpu::Surface<'static>>) -> Result<Self, WindowError> {
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
             compatible_surface: surface,
@@ -74,10 +68,7 @@ impl Gpu {
         let report = |fault: &Arc<Mutex<Option<String>>>| {
             let fault = Arc::clone(fault);
             move |text: String| {
-                fault
-                    .lock()
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .get_or_insert(text);
+                fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
             }
         };
         let on_error = report(&fault);
@@ -89,36 +80,33 @@ impl Gpu {
                 on_loss(format!("the device was lost: {}", text.replace('\n', " ")));
             }
         });
-        Ok(Self {
-            instance,
-            adapter,
-            device,
-            queue,
-            fault,
-        })
+        Ok(Self { instance, adapter, device, queue, fault })
     }
 
     /// The first error that was reported since the start, once.
     pub(super) fn fault(&self) -> Result<(), WindowError> {
-        match self
-            .fault
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .take()
-        {
+        match self.fault.lock().unwrap_or_else(PoisonError::into_inner).take() {
             Some(text) => Err(WindowError::Device(text)),
             None => Ok(()),
         }
+    }
+
+    /// Whether the device is the processor, where every sample of a pixel costs what a pixel costs.
+    fn is_slow(&self) -> bool {
+        self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Texture samples along the direction in which a texture is squeezed: floors are seen at grazing angles.
+    pub(super) fn anisotropy(&self) -> u16 {
+        if self.is_slow() { 1 } else { 16 }
     }
 
     /// Samples per pixel for a target of this format.
     pub(super) fn samples(&self, format: wgpu::TextureFormat) -> u32 {
         let can = |format| self.adapter.get_texture_format_features(format).flags;
         let resolves = can(format).contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
-        let both = [format, DEPTH]
-            .into_iter()
-            .all(|f| can(f).sample_count_supported(SAMPLES));
-        if both && resolves { SAMPLES } else { 1 }
+        let both = [format, DEPTH].into_iter().all(|f| can(f).sample_count_supported(SAMPLES));
+        if both && resolves && !self.is_slow() { SAMPLES } else { 1 }
     }
 }
 
@@ -139,13 +127,8 @@ fn instance(systems: Backends, display: Option<&OwnedDisplayHandle>) -> wgpu::In
 }
 
 /// A surface on the window; it keeps the window alive.
-fn surface(
-    instance: &wgpu::Instance,
-    window: &Arc<Window>,
-) -> Result<wgpu::Surface<'static>, WindowError> {
-    instance
-        .create_surface(Arc::clone(window))
-        .map_err(|error| WindowError::NoAdapter(one_line(&error)))
+fn surface(instance: &wgpu::Instance, window: &Arc<Window>) -> Result<wgpu::Surface<'static>, WindowError> {
+    instance.create_surface(Arc::clone(window)).map_err(|error| WindowError::NoAdapter(one_line(&error)))
 }
 
 /// An error with its causes, in one line.

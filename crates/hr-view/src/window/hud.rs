@@ -11,9 +11,9 @@ const MESSAGE: Duration = Duration::from_secs(4);
 
 /// Keys and what they do, as the help shows them.
 const KEYS: [(&str, &str); 12] = [
-    ("W A S D, ↑ ↓", "walk"),
+    ("W A S D, arrows up, down", "walk"),
     ("E Q, space shift", "up, down"),
-    ("drag, ← →", "look around"),
+    ("drag, arrows left, right", "look around"),
     ("right click, C", "capture or free the mouse"),
     ("wheel", "walking speed"),
     ("1 … 9, 0", "the scene's cameras"),
@@ -77,34 +77,16 @@ impl Hud {
         context.set_theme(egui::Theme::Dark);
         let largest = gpu.device.limits().max_texture_dimension_2d as usize;
         let scale = Some(window.scale_factor() as f32);
-        let state = egui_winit::State::new(
-            context.clone(),
-            egui::ViewportId::ROOT,
-            window,
-            scale,
-            None,
-            Some(largest),
-        );
-        let renderer =
-            egui_wgpu::Renderer::new(&gpu.device, format, egui_wgpu::RendererOptions::default());
-        Self {
-            context,
-            state,
-            renderer,
-            show_line: true,
-            show_help: false,
-            message: None,
-        }
+        let state = egui_winit::State::new(context.clone(), egui::ViewportId::ROOT, window, scale, None, Some(largest));
+        let renderer = egui_wgpu::Renderer::new(&gpu.device, format, egui_wgpu::RendererOptions::default());
+        Self { context, state, renderer, show_line: true, show_help: false, message: None }
     }
 
     /// Lets egui see an event; whether it takes it for itself, and whether it looks different after it.
     pub(super) fn event(&mut self, window: &Window, event: &WindowEvent) -> (bool, bool) {
         // Its own idea of Tab, arrows and the like must not follow us while no control is shown.
         let response = self.state.on_window_event(window, event);
-        (
-            self.show_help && response.consumed,
-            self.show_help && response.repaint,
-        )
+        (self.show_help && response.consumed, self.show_help && response.repaint)
     }
 
     /// Shows a message for a while.
@@ -113,19 +95,11 @@ impl Hud {
     }
 
     /// Lays everything out; the help's controls change `settings`.
-    pub(super) fn layout(
-        &mut self,
-        window: &Window,
-        facts: &Facts<'_>,
-        settings: &mut Settings,
-    ) -> Layout {
+    pub(super) fn layout(&mut self, window: &Window, facts: &Facts<'_>, settings: &mut Settings) -> Layout {
         let now = Instant::now();
         self.message = self.message.take().filter(|(_, until)| *until > now);
         let input = self.state.take_egui_input(window);
-        let (show_line, message) = (
-            self.show_line,
-            self.message.as_ref().map(|(text, _)| text.as_str()),
-        );
+        let (show_line, message) = (self.show_line, self.message.as_ref().map(|(text, _)| text.as_str()));
         let mut show_help = self.show_help;
         let output = self.context.run_ui(input, |ui| {
             let context = ui.ctx().clone();
@@ -133,31 +107,19 @@ impl Hud {
                 line(&context, facts, settings);
             }
             if let Some(text) = message {
-                label(
-                    &context,
-                    "message",
-                    Align2::CENTER_BOTTOM,
-                    [0.0, -16.0],
-                    text,
-                );
+                label(&context, "message", Align2::CENTER_BOTTOM, [0.0, -16.0], text);
             }
             if show_help {
                 help(&context, facts, settings, &mut show_help);
             }
         });
         self.show_help = show_help;
-        self.state
-            .handle_platform_output(window, output.platform_output);
-        let delay = output
-            .viewport_output
-            .get(&egui::ViewportId::ROOT)
-            .map(|o| o.repaint_delay);
+        self.state.handle_platform_output(window, output.platform_output);
+        let delay = output.viewport_output.get(&egui::ViewportId::ROOT).map(|o| o.repaint_delay);
         let again = delay.and_then(|delay| now.checked_add(delay));
         let fades = self.message.as_ref().map(|(_, until)| *until);
         Layout {
-            primitives: self
-                .context
-                .tessellate(output.shapes, output.pixels_per_point),
+            primitives: self.context.tessellate(output.shapes, output.pixels_per_point),
             textures: output.textures_delta,
             pixels_per_point: output.pixels_per_point,
             again: [again, fades].into_iter().flatten().min(),
@@ -173,42 +135,26 @@ impl Hud {
         size: [u32; 2],
         layout: Layout,
     ) {
-        let Layout {
-            primitives,
-            mut textures,
-            pixels_per_point,
-            ..
-        } = layout;
+        let Layout { primitives, mut textures, pixels_per_point, .. } = layout;
         for (id, deltas) in &textures.set {
             for delta in deltas {
-                self.renderer
-                    .update_texture(&gpu.device, &gpu.queue, *id, delta);
+                self.renderer.update_texture(&gpu.device, &gpu.queue, *id, delta);
             }
         }
-        let screen = egui_wgpu::ScreenDescriptor {
-            size_in_pixels: size,
-            pixels_per_point,
-        };
+        let screen = egui_wgpu::ScreenDescriptor { size_in_pixels: size, pixels_per_point };
         // Only paint callbacks give command buffers, and there are none.
-        drop(
-            self.renderer
-                .update_buffers(&gpu.device, &gpu.queue, encoder, &primitives, &screen),
-        );
+        drop(self.renderer.update_buffers(&gpu.device, &gpu.queue, encoder, &primitives, &screen));
         let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("head-up display"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: output,
                 depth_slice: None,
                 resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Load,
-                    store: wgpu::StoreOp::Store,
-                },
+                ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
             })],
             ..wgpu::RenderPassDescriptor::default()
         });
-        self.renderer
-            .render(&mut pass.forget_lifetime(), &primitives, &screen);
+        self.renderer.render(&mut pass.forget_lifetime(), &primitives, &screen);
         for id in &textures.free {
             self.renderer.free_texture(id);
         }
@@ -219,37 +165,21 @@ impl Hud {
 
 /// A dark, half transparent box, readable over any picture.
 fn backdrop() -> Frame {
-    Frame::NONE
-        .fill(Color32::from_black_alpha(170))
-        .inner_margin(Margin::symmetric(8, 5))
-        .corner_radius(4)
+    Frame::NONE.fill(Color32::from_black_alpha(170)).inner_margin(Margin::symmetric(8, 5)).corner_radius(4)
 }
 
 fn label(context: &egui::Context, id: &str, anchor: Align2, offset: [f32; 2], text: &str) {
-    egui::Area::new(egui::Id::unique(id))
-        .anchor(anchor, offset)
-        .interactable(false)
-        .show(context, |ui| {
-            backdrop().show(ui, |ui| {
-                ui.add(
-                    egui::Label::new(RichText::new(text).color(Color32::WHITE))
-                        .wrap_mode(egui::TextWrapMode::Extend),
-                );
-            });
+    egui::Area::new(egui::Id::unique(id)).anchor(anchor, offset).interactable(false).show(context, |ui| {
+        backdrop().show(ui, |ui| {
+            ui.add(egui::Label::new(RichText::new(text).color(Color32::WHITE)).wrap_mode(egui::TextWrapMode::Extend));
         });
+    });
 }
 
 fn line(context: &egui::Context, facts: &Facts<'_>, settings: &Settings) {
     let milliseconds = facts.frame.as_secs_f64() * 1e3;
-    let rate = if milliseconds > 0.0 {
-        1e3 / milliseconds
-    } else {
-        0.0
-    };
-    let camera = facts
-        .camera
-        .map(|name| format!(" · {name}"))
-        .unwrap_or_default();
+    let rate = if milliseconds > 0.0 { 1e3 / milliseconds } else { 0.0 };
+    let camera = facts.camera.map(|name| format!(" · {name}")).unwrap_or_default();
     let text = format!(
         "{}{camera}   {milliseconds:.1} ms  {rate:.0} fps   {} triangles   glossy {} of {} vertices in {:.1} ms   {:+.1} EV   H help",
         facts.scene,
@@ -263,10 +193,7 @@ fn line(context: &egui::Context, facts: &Facts<'_>, settings: &Settings) {
 }
 
 fn help(context: &egui::Context, facts: &Facts<'_>, settings: &mut Settings, open: &mut bool) {
-    let window = egui::Window::new("Help")
-        .open(open)
-        .collapsible(false)
-        .resizable(false);
+    let window = egui::Window::new("Help").open(open).collapsible(false).resizable(false);
     window.anchor(Align2::CENTER_CENTER, [0.0, 0.0]).show(context, |ui| {
         egui::Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).show(ui, |ui| {
             for (keys, action) in KEYS {
@@ -278,7 +205,7 @@ fn help(context: &egui::Context, facts: &Facts<'_>, settings: &mut Settings, ope
         ui.separator();
         egui::Grid::new("settings").num_columns(2).spacing([24.0, 4.0]).show(ui, |ui| {
             ui.label("Exposure");
-            ui.add(egui::Slider::new(&mut settings.stops, -10.0..=10.0).suffix(" EV"));
+            ui.add(egui::Slider::new(&mut settings.stops, -10.0..=10.0).suffix(" EV").fixed_decimals(1));
             ui.end_row();
             ui.label("Field of view");
             ui.add(egui::Slider::new(&mut settings.fov_x, 20.0..=120.0).suffix("°").fixed_decimals(0));

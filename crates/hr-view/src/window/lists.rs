@@ -40,10 +40,7 @@ pub(super) fn split(mesh: &DisplayMesh) -> [VertexList; 2] {
             }
             let indices = start..count(list.indices.len());
             if !indices.is_empty() {
-                list.batches.push(Batch {
-                    indices,
-                    texture: batch.texture,
-                });
+                list.batches.push(Batch { indices, texture: batch.texture });
             }
         }
         list
@@ -65,46 +62,15 @@ mod tests {
         let mesh = DisplayMesh {
             positions: (0..5).map(|i| Vec3::splat(i as f32)).collect(),
             indices: vec![0, 1, 2, 2, 1, 3, 3, 4, 2],
-            batches: vec![
-                Batch {
-                    indices: 0..6,
-                    texture: None,
-                },
-                Batch {
-                    indices: 6..9,
-                    texture: Some(0),
-                },
-            ],
+            batches: vec![Batch { indices: 0..6, texture: None }, Batch { indices: 6..9, texture: Some(0) }],
             glossy: vec![4],
             ..DisplayMesh::default()
         };
         let [diffuse, glossy] = split(&mesh);
-        assert_eq!(
-            diffuse.vertices,
-            [0, 1, 2, 3],
-            "vertices of the triangles without vertex 4"
-        );
-        assert_eq!(
-            diffuse.batches,
-            [Batch {
-                indices: 0..6,
-                texture: None
-            }],
-            "one batch keeps both"
-        );
-        assert_eq!(
-            glossy.vertices,
-            [3, 4, 2],
-            "the glossy triangle brings its other corners along"
-        );
+        assert_eq!(diffuse.vertices, [0, 1, 2, 3], "vertices of the triangles without vertex 4");
+        assert_eq!(diffuse.batches, [Batch { indices: 0..6, texture: None }], "one batch keeps both");
+        assert_eq!(glossy.vertices, [3, 4, 2], "the glossy triangle brings its other corners along");
         assert_eq!(glossy.indices, [0, 1, 2], "renumbered");
-        assert_eq!(
-            glossy.batches,
-            [Batch {
-                indices: 0..3,
-                texture: Some(0)
-            }],
-            "and its texture"
-        );
+        assert_eq!(glossy.batches, [Batch { indices: 0..3, texture: Some(0) }], "and its texture");
     }
 }

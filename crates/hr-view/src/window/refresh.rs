@@ -59,11 +59,7 @@ impl Refresh {
         let count = list.vertices.len();
         Self {
             slots: list.vertices.iter().map(|&v| slot_of[v as usize]).collect(),
-            positions: list
-                .vertices
-                .iter()
-                .map(|&v| mesh.positions[v as usize])
-                .collect(),
+            positions: list.vertices.iter().map(|&v| mesh.positions[v as usize]).collect(),
             seen_from: vec![Vec3::ZERO; count],
             radiance: vec![Rgb::ZERO; count],
             needed_in: vec![0; count],
@@ -127,10 +123,7 @@ impl Refresh {
 fn may_be_seen([a, b, c]: [Vec3; 3], sight: &Sight) -> bool {
     let normal = (b - a).cross(c - a);
     normal.dot(sight.eye - a) > 0.0
-        && sight
-            .sides
-            .iter()
-            .all(|side| [a, b, c].iter().any(|p| side.dot(p - sight.eye) >= 0.0))
+        && sight.sides.iter().all(|side| [a, b, c].iter().any(|p| side.dot(p - sight.eye) >= 0.0))
 }
 
 #[cfg(test)]
@@ -160,17 +153,11 @@ mod tests {
                 emission: vec![Rgb::ZERO; 4],
                 uv: vec![Vec2::ZERO; 4],
                 indices: vec![0, 1, 2, 0, 2, 3],
-                batches: vec![Batch {
-                    indices: 0..6,
-                    texture: None,
-                }],
+                batches: vec![Batch { indices: 0..6, texture: None }],
                 glossy: vec![3, 2, 1, 0],
                 ..DisplayMesh::default()
             };
-            Self {
-                mesh,
-                asked: AtomicUsize::new(0),
-            }
+            Self { mesh, asked: AtomicUsize::new(0) }
         }
     }
 
@@ -190,13 +177,7 @@ mod tests {
         }
     }
 
-    fn update(
-        refresh: &mut Refresh,
-        square: &Square,
-        eye: DVec3,
-        target: DVec3,
-        tolerance: f32,
-    ) -> Refreshed {
+    fn update(refresh: &mut Refresh, square: &Square, eye: DVec3, target: DVec3, tolerance: f32) -> Refreshed {
         let [_, list] = split(square.mesh());
         let view = View::looking(eye, target - eye, DVec3::Y, 90.0);
         refresh.update(square, &list, eye, &view.sight(DVec3::ZERO, 1.0), tolerance)
@@ -208,48 +189,18 @@ mod tests {
         let [_, list] = split(square.mesh());
         let mut refresh = Refresh::new(&square, &list);
         let eye = DVec3::new(0.0, 0.0, 4.0);
-        let all = Refreshed {
-            visible: 4,
-            evaluated: 4,
-        };
-        assert_eq!(
-            update(&mut refresh, &square, eye, DVec3::ZERO, 0.0),
-            all,
-            "first sight"
-        );
-        assert!(
-            refresh.radiance().iter().all(|r| *r == Rgb::splat(4.0)),
-            "values arrive: {:?}",
-            refresh.radiance()
-        );
+        let all = Refreshed { visible: 4, evaluated: 4 };
+        assert_eq!(update(&mut refresh, &square, eye, DVec3::ZERO, 0.0), all, "first sight");
+        assert!(refresh.radiance().iter().all(|r| *r == Rgb::splat(4.0)), "values arrive: {:?}", refresh.radiance());
 
-        let nothing = Refreshed {
-            visible: 4,
-            evaluated: 0,
-        };
-        assert_eq!(
-            update(&mut refresh, &square, eye, DVec3::ZERO, 0.0),
-            nothing,
-            "the same eye"
-        );
+        let nothing = Refreshed { visible: 4, evaluated: 0 };
+        assert_eq!(update(&mut refresh, &square, eye, DVec3::ZERO, 0.0), nothing, "the same eye");
 
         // From 4 to 4.01 above, the direction of a corner turns by about 0.01 · √2/18 = 0.0008 rad.
         let nearer = DVec3::new(0.0, 0.0, 4.01);
-        assert_eq!(
-            update(&mut refresh, &square, nearer, DVec3::ZERO, 0.01),
-            nothing,
-            "within the tolerance"
-        );
-        assert_eq!(
-            update(&mut refresh, &square, nearer, DVec3::ZERO, 0.0),
-            all,
-            "a tolerance of 0 takes any change"
-        );
-        assert_eq!(
-            square.asked.load(Ordering::Relaxed),
-            8,
-            "two full evaluations in all"
-        );
+        assert_eq!(update(&mut refresh, &square, nearer, DVec3::ZERO, 0.01), nothing, "within the tolerance");
+        assert_eq!(update(&mut refresh, &square, nearer, DVec3::ZERO, 0.0), all, "a tolerance of 0 takes any change");
+        assert_eq!(square.asked.load(Ordering::Relaxed), 8, "two full evaluations in all");
     }
 
     #[test]
@@ -260,22 +211,9 @@ mod tests {
         let above = DVec3::new(0.0, 0.0, 4.0);
         let away = update(&mut refresh, &square, above, DVec3::new(0.0, 0.0, 9.0), 0.0);
         assert_eq!(away, Refreshed::default(), "it is behind the eye");
-        let below = update(
-            &mut refresh,
-            &square,
-            DVec3::new(0.0, 0.0, -4.0),
-            DVec3::ZERO,
-            0.0,
-        );
+        let below = update(&mut refresh, &square, DVec3::new(0.0, 0.0, -4.0), DVec3::ZERO, 0.0);
         assert_eq!(below, Refreshed::default(), "its back is culled");
         let now = update(&mut refresh, &square, above, DVec3::ZERO, 0.0);
-        assert_eq!(
-            now,
-            Refreshed {
-                visible: 4,
-                evaluated: 4
-            },
-            "turning toward it is enough"
-        );
+        assert_eq!(now, Refreshed { visible: 4, evaluated: 4 }, "turning toward it is enough");
     }
 }

@@ -10,9 +10,6 @@ use crate::display::{Batch, DisplayMesh};
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Vec3, Vec4};
 use glossy_ext::Rgb;
-use hr_scene::Texture;
-use hr_scene::scene::Texels;
-use std::sync::Arc;
 use wgpu::util::DeviceExt;
 
 /// The near plane, as a share of the scene's diagonal: closer than anyone goes to a wall, and depth does not mind.
@@ -42,7 +39,8 @@ struct Vertex {
     uv: [f32; 2],
 }
 
-const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 5] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32x3, 4 => Float32x2];
+const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 5] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32x3, 4 => Float32x2];
 const GLOSSY_ATTRIBUTES: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![5 => Float32x3];
 
 /// One of the two lists.
@@ -68,11 +66,7 @@ pub(super) struct SceneBuffers {
 
 impl SceneBuffers {
     /// Uploads a checked mesh, split into its lists.
-    pub(super) fn new(
-        gpu: &Gpu,
-        mesh: &DisplayMesh,
-        lists: &[VertexList; 2],
-    ) -> Result<Self, WindowError> {
+    pub(super) fn new(gpu: &Gpu, mesh: &DisplayMesh, lists: &[VertexList; 2]) -> Result<Self, WindowError> {
         let device = &gpu.device;
         let [diffuse, glossy] = lists;
         let frame = device.create_buffer(&wgpu::BufferDescriptor {
@@ -88,26 +82,13 @@ impl SceneBuffers {
         let frame_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("frame"),
             layout: &frame_layout,
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: frame.as_entire_binding(),
-            }],
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: frame.as_entire_binding() }],
         });
         let material_layout = material_layout(device);
         let uploader = Uploader::new(gpu);
-        let white = Texture {
-            texels: Arc::new(Texels {
-                width: 1,
-                height: 1,
-                data: vec![Rgb::ONE],
-            }),
-            transform: Mat3::IDENTITY,
-            wrap: Default::default(),
-        };
-        let materials = mesh.textures.iter().chain([&white]);
-        let materials = materials
-            .map(|texture| material(device, &uploader, &material_layout, texture))
-            .collect();
+        let textures = mesh.textures.iter().map(|texture| (uploader.upload(texture), texture.transform));
+        let materials = textures.chain([(uploader.white(), Mat3::IDENTITY)]);
+        let materials = materials.map(|(texture, place)| material(device, &material_layout, &texture, place)).collect();
         let limit = device.limits().max_buffer_size;
         let glossy_bytes = (glossy.vertices.len() * size_of::<Rgb>()).max(size_of::<Rgb>()) as u64;
         let diagonal = mesh.diagonal();
@@ -129,18 +110,13 @@ impl SceneBuffers {
                 immediate_size: 0,
             }),
             shader: device.create_shader_module(wgpu::include_wgsl!("scene.wgsl")),
-            near: if diagonal > 0.0 {
-                NEAR * diagonal
-            } else {
-                NEAR
-            },
+            near: if diagonal > 0.0 { NEAR * diagonal } else { NEAR },
         })
     }
 
     /// Uploads the radiances of the glossy list.
     pub(super) fn set_glossy(&self, gpu: &Gpu, radiance: &[Rgb]) {
-        gpu.queue
-            .write_buffer(&self.glossy_radiance, 0, bytemuck::cast_slice(radiance));
+        gpu.queue.write_buffer(&self.glossy_radiance, 0, bytemuck::cast_slice(radiance));
     }
 }
 
@@ -165,40 +141,36 @@ impl Pass {
     pub(super) fn new(gpu: &Gpu, scene: &SceneBuffers, format: wgpu::TextureFormat) -> Self {
         let samples = gpu.samples(format);
         let pipeline = |entry: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
-            gpu.device
-                .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                    label: Some(entry),
-                    layout: Some(&scene.layout),
-                    vertex: wgpu::VertexState {
-                        module: &scene.shader,
-                        entry_point: Some(entry),
-                        compilation_options: wgpu::PipelineCompilationOptions::default(),
-                        buffers,
-                    },
-                    primitive: wgpu::PrimitiveState {
-                        cull_mode: Some(wgpu::Face::Back),
-                        ..wgpu::PrimitiveState::default()
-                    },
-                    depth_stencil: Some(wgpu::DepthStencilState {
-                        format: DEPTH,
-                        depth_write_enabled: Some(true),
-                        depth_compare: Some(wgpu::CompareFunction::Greater),
-                        stencil: wgpu::StencilState::default(),
-                        bias: wgpu::DepthBiasState::default(),
-                    }),
-                    multisample: wgpu::MultisampleState {
-                        count: samples,
-                        ..wgpu::MultisampleState::default()
-                    },
-                    fragment: Some(wgpu::FragmentState {
-                        module: &scene.shader,
-                        entry_point: Some("fragment"),
-                        compilation_options: wgpu::PipelineCompilationOptions::default(),
-                        targets: &[Some(format.into())],
-                    }),
-                    multiview_mask: None,
-                    cache: None,
-                })
+            gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(entry),
+                layout: Some(&scene.layout),
+                vertex: wgpu::VertexState {
+                    module: &scene.shader,
+                    entry_point: Some(entry),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    buffers,
+                },
+                primitive: wgpu::PrimitiveState {
+                    cull_mode: Some(wgpu::Face::Back),
+                    ..wgpu::PrimitiveState::default()
+                },
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: DEPTH,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(wgpu::CompareFunction::Greater),
+                    stencil: wgpu::StencilState::default(),
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState { count: samples, ..wgpu::MultisampleState::default() },
+                fragment: Some(wgpu::FragmentState {
+                    module: &scene.shader,
+                    entry_point: Some("fragment"),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    targets: &[Some(format.into())],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
         };
         let fixed = Some(wgpu::VertexBufferLayout {
             array_stride: size_of::<Vertex>() as u64,
@@ -234,11 +206,7 @@ impl Pass {
         size: [u32; 2],
         frame: &Frame<'_>,
     ) {
-        gpu.queue.write_buffer(
-            &scene.frame,
-            0,
-            bytemuck::bytes_of(&frame.uniform(scene.near, size, self.format)),
-        );
+        gpu.queue.write_buffer(&scene.frame, 0, bytemuck::bytes_of(&frame.uniform(scene.near, size, self.format)));
         if self.targets.as_ref().is_none_or(|t| t.size != size) {
             self.targets = Some(Targets {
                 size,
@@ -251,37 +219,24 @@ impl Pass {
             Some(color) => (color, Some(output)),
             None => (output, None),
         };
-        let store = if resolve_target.is_some() {
-            wgpu::StoreOp::Discard
-        } else {
-            wgpu::StoreOp::Store
-        };
+        let store = if resolve_target.is_some() { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("scene"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view,
                 depth_slice: None,
                 resolve_target,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store,
-                },
+                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &targets.depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Discard,
-                }),
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Discard }),
                 stencil_ops: None,
             }),
             ..wgpu::RenderPassDescriptor::default()
         });
         pass.set_bind_group(0, &scene.frame_group, &[]);
-        for (list, pipeline, follows) in [
-            (&scene.diffuse, &self.diffuse, false),
-            (&scene.glossy, &self.glossy, true),
-        ] {
+        for (list, pipeline, follows) in [(&scene.diffuse, &self.diffuse, false), (&scene.glossy, &self.glossy, true)] {
             if list.batches.is_empty() {
                 continue;
             }
@@ -309,16 +264,9 @@ pub(super) struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    fn uniform(
-        &self,
-        near: f32,
-        [width, height]: [u32; 2],
-        format: wgpu::TextureFormat,
-    ) -> FrameUniform {
+    fn uniform(&self, near: f32, [width, height]: [u32; 2], format: wgpu::TextureFormat) -> FrameUniform {
         let (view, tone) = (self.view, self.tone);
-        let [x, y] = view
-            .scales(f64::from(width) / f64::from(height))
-            .map(|s| s as f32);
+        let [x, y] = view.scales(f64::from(width) / f64::from(height)).map(|s| s as f32);
         let (n, d) = (tone.curve.numerator, tone.curve.denominator);
         let column = |v: Vec3, w: f32| Vec4::from((v, w)).to_array();
         FrameUniform {
@@ -334,19 +282,10 @@ impl Frame<'_> {
 }
 
 /// An intermediate target.
-fn target(
-    gpu: &Gpu,
-    [width, height]: [u32; 2],
-    sample_count: u32,
-    format: wgpu::TextureFormat,
-) -> wgpu::TextureView {
+fn target(gpu: &Gpu, [width, height]: [u32; 2], sample_count: u32, format: wgpu::TextureFormat) -> wgpu::TextureView {
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("target"),
-        size: wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count,
         dimension: wgpu::TextureDimension::D2,
@@ -371,12 +310,8 @@ fn uniform_entry(binding: u32, visibility: wgpu::ShaderStages) -> wgpu::BindGrou
 }
 
 fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::FRAGMENT,
-        ty,
-        count: None,
-    };
+    let entry =
+        |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None };
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("material"),
         entries: &[
@@ -388,10 +323,7 @@ fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
                     multisampled: false,
                 },
             ),
-            entry(
-                1,
-                wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-            ),
+            entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
             uniform_entry(2, wgpu::ShaderStages::FRAGMENT),
         ],
     })
@@ -399,12 +331,11 @@ fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 
 fn material(
     device: &wgpu::Device,
-    uploader: &Uploader<'_>,
     layout: &wgpu::BindGroupLayout,
-    texture: &Texture,
+    (view, sampler): &(wgpu::TextureView, wgpu::Sampler),
+    transform: Mat3,
 ) -> wgpu::BindGroup {
-    let (view, sampler) = uploader.upload(texture);
-    let [u, v] = [0, 1].map(|row| Vec4::from((texture.transform.row(row), 0.0)).to_array());
+    let [u, v] = [0, 1].map(|row| Vec4::from((transform.row(row), 0.0)).to_array());
     let placement = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: Some("placement"),
         contents: bytemuck::cast_slice(&[u, v]),
@@ -414,18 +345,9 @@ fn material(
         label: Some("material"),
         layout,
         entries: &[
-            wgpu::BindGroupEntry {
-                binding: 0,
-                resource: wgpu::BindingResource::TextureView(&view),
-            },
-            wgpu::BindGroupEntry {
-                binding: 1,
-                resource: wgpu::BindingResource::Sampler(&sampler),
-            },
-            wgpu::BindGroupEntry {
-                binding: 2,
-                resource: placement.as_entire_binding(),
-            },
+            wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
+            wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(sampler) },
+            wgpu::BindGroupEntry { binding: 2, resource: placement.as_entire_binding() },
         ],
     })
 }
@@ -450,32 +372,16 @@ fn list_buffers(
     };
     let vertices: Vec<Vertex> = list.vertices.iter().map(vertex).collect();
     let buffer = |label, contents: &[u8], usage| {
-        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents,
-            usage,
-        })
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
     };
     Ok(ListBuffers {
-        vertices: buffer(
-            "vertices",
-            bytemuck::cast_slice(&vertices),
-            wgpu::BufferUsages::VERTEX,
-        ),
-        indices: buffer(
-            "indices",
-            bytemuck::cast_slice(&list.indices),
-            wgpu::BufferUsages::INDEX,
-        ),
+        vertices: buffer("vertices", bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
+        indices: buffer("indices", bytemuck::cast_slice(&list.indices), wgpu::BufferUsages::INDEX),
         batches: list.batches.clone(),
     })
 }
 
 /// A buffer size, if the device can hold it.
 fn fitting(size: u64, limit: u64) -> Result<u64, WindowError> {
-    if size <= limit {
-        Ok(size)
-    } else {
-        Err(WindowError::TooLarge { size, limit })
-    }
+    if size <= limit { Ok(size) } else { Err(WindowError::TooLarge { size, limit }) }
 }

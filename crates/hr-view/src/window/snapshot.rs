@@ -28,11 +28,7 @@ impl Snapshot {
     /// # Errors
     /// [`WindowError::NoAdapter`] without a graphics device, [`WindowError::Mesh`] for a mesh that does not
     /// [check](crate::display::DisplayMesh::check), [`WindowError::TooLarge`] where mesh or picture exceed the device.
-    pub fn of(
-        walk: &dyn Walkable,
-        camera: &Camera,
-        tone: Option<&Tone>,
-    ) -> Result<Self, WindowError> {
+    pub fn of(walk: &dyn Walkable, camera: &Camera, tone: Option<&Tone>) -> Result<Self, WindowError> {
         let mesh = walk.mesh();
         mesh.check()?;
         let gpu = Gpu::new()?;
@@ -45,11 +41,7 @@ impl Snapshot {
         refresh.update(walk, &lists[1], view.eye, &sight, 0.0);
         scene.set_glossy(&gpu, refresh.radiance());
         let automatic = Tone::for_mesh(mesh);
-        let frame = Frame {
-            view: &view,
-            tone: tone.unwrap_or(&automatic),
-            mesh,
-        };
+        let frame = Frame { view: &view, tone: tone.unwrap_or(&automatic), mesh };
         Self::draw(&gpu, &scene, size, &frame)
     }
 
@@ -62,17 +54,10 @@ impl Snapshot {
     ) -> Result<Self, WindowError> {
         let limit = gpu.device.limits().max_texture_dimension_2d;
         if width > limit || height > limit {
-            return Err(WindowError::TooLarge {
-                size: width.max(height).into(),
-                limit: limit.into(),
-            });
+            return Err(WindowError::TooLarge { size: width.max(height).into(), limit: limit.into() });
         }
         let format = wgpu::TextureFormat::Rgba8Unorm;
-        let size = wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        };
+        let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("snapshot"),
             size,
@@ -90,55 +75,33 @@ impl Snapshot {
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         Pass::new(gpu, scene, format).draw(gpu, scene, &mut encoder, &view, [width, height], frame);
         encoder.copy_texture_to_buffer(
             texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &buffer,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(row),
-                    rows_per_image: None,
-                },
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None },
             },
             size,
         );
         gpu.queue.submit([encoder.finish()]);
         let (sender, receiver) = std::sync::mpsc::channel();
         // A receiver that is gone has given up on the picture.
-        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            drop(sender.send(result))
-        });
-        gpu.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| WindowError::Device(one_line(&e)))?;
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| WindowError::Device(one_line(&e)))?;
         gpu.fault()?;
         match receiver.try_recv() {
             Ok(Ok(())) => {}
             _ => {
-                return Err(WindowError::Device(
-                    "the picture could not be read back".into(),
-                ));
+                return Err(WindowError::Device("the picture could not be read back".into()));
             }
         }
-        let mapped = buffer
-            .get_mapped_range(..)
-            .map_err(|e| WindowError::Device(one_line(&e)))?;
+        let mapped = buffer.get_mapped_range(..).map_err(|e| WindowError::Device(one_line(&e)))?;
         let bytes = mapped.to_vec();
-        let rgba = bytes
-            .chunks(row as usize)
-            .flat_map(|line| &line[..4 * width as usize])
-            .copied()
-            .collect();
-        Ok(Self {
-            width,
-            height,
-            rgba,
-        })
+        let rgba = bytes.chunks(row as usize).flat_map(|line| &line[..4 * width as usize]).copied().collect();
+        Ok(Self { width, height, rgba })
     }
 
     /// Writes a PNG file.
@@ -155,9 +118,6 @@ impl Snapshot {
             image::ExtendedColorType::Rgba8,
             format,
         )
-        .map_err(|error| WindowError::Save {
-            path: path.to_path_buf(),
-            reason: one_line(&error),
-        })
+        .map_err(|error| WindowError::Save { path: path.to_path_buf(), reason: one_line(&error) })
     }
 }

@@ -6,7 +6,6 @@
 use crate::display::DisplayMesh;
 use glam::{Mat3, Vec3};
 use glossy_ext::Rgb;
-use hr_scene::Primaries;
 
 /// A filmic curve y = x (a x + b) / (x (c x + d) + e), the common form of the usual rational fits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,10 +18,7 @@ pub struct Curve {
 
 impl Curve {
     /// K. Narkowicz, "ACES Filmic Tone Mapping Curve", 2015: a fit of the reference rendering transform.
-    pub const ACES_FIT: Self = Self {
-        numerator: [2.51, 0.03],
-        denominator: [2.43, 0.59, 0.14],
-    };
+    pub const ACES_FIT: Self = Self { numerator: [2.51, 0.03], denominator: [2.43, 0.59, 0.14] };
 
     /// The curve at `x` ≥ 0, clamped to 0…1.
     #[must_use]
@@ -55,64 +51,42 @@ impl Tone {
     /// that it does not depend on how finely surfaces are meshed; where no diffuse surface is lit, over emission.
     #[must_use]
     pub fn for_mesh(mesh: &DisplayMesh) -> Self {
-        let to_srgb = to_srgb(mesh.primaries);
+        let to_srgb = mesh.primaries.to_srgb().as_mat3();
         let diffuse = |v: usize| mesh.irradiance[v] * mesh.tint[v];
         let emitted = |v: usize| mesh.emission[v];
-        let mean = log_mean(mesh, to_srgb, diffuse).or_else(|| log_mean(mesh, to_srgb, emitted));
+        let mean = log_mean(mesh, diffuse).or_else(|| log_mean(mesh, emitted));
         let exposure = mean.map_or(1.0, |mean| (KEY / mean).clamp(1e-20, 1e20));
-        Self {
-            exposure,
-            to_srgb,
-            curve: Curve::ACES_FIT,
-        }
+        Self { exposure, to_srgb, curve: Curve::ACES_FIT }
     }
 
     /// sRGB-encoded colour, 0…1 per channel, of a radiance; black where that is not a number.
     #[must_use]
     pub fn apply(&self, radiance: Rgb) -> Vec3 {
         // Cut on both sides of the matrix: nothing may overflow in it, no negative channel may come out of it.
-        let exposed = (radiance * self.exposure)
-            .to_array()
-            .map(|x| x.max(0.0).min(BRIGHTEST));
-        let linear = self.to_srgb * Vec3::from_array(exposed);
-        Vec3::from_array(
-            linear
-                .to_array()
-                .map(|x| srgb_encode(self.curve.at(x.max(0.0)))),
-        )
+        let exposed = finite(radiance * self.exposure).clamp(Vec3::ZERO, Vec3::splat(BRIGHTEST));
+        let linear = self.to_srgb * exposed;
+        Vec3::from_array(linear.to_array().map(|x| srgb_encode(self.curve.at(x.max(0.0)))))
     }
 }
 
 /// The nearest finite colour, black where not a number: shaders are not bound to carry infinities and NaN through.
 pub(super) fn finite(v: Rgb) -> Rgb {
-    Rgb::from_array(v.to_array().map(|x| {
-        if x.is_nan() {
-            0.0
-        } else {
-            x.clamp(f32::MIN, f32::MAX)
-        }
-    }))
+    Rgb::from_array(v.to_array().map(|x| if x.is_nan() { 0.0 } else { x.clamp(f32::MIN, f32::MAX) }))
 }
 
 /// The sRGB transfer function (IEC 61966-2-1) of a linear value in 0…1.
 pub(super) fn srgb_encode(x: f32) -> f32 {
-    if x <= 0.003_130_8 {
-        12.92 * x
-    } else {
-        1.055 * x.powf(1.0 / 2.4) - 0.055
-    }
+    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// Geometric mean of the luminance of a radiance over all lit surface area; `None` where there is none.
-fn log_mean(mesh: &DisplayMesh, to_srgb: Mat3, radiance: impl Fn(usize) -> Rgb) -> Option<f32> {
-    // Luminance of linear sRGB (IEC 61966-2-1).
-    let weights = to_srgb.transpose() * Vec3::new(0.2126, 0.7152, 0.0722);
+fn log_mean(mesh: &DisplayMesh, radiance: impl Fn(usize) -> Rgb) -> Option<f32> {
+    let weights = mesh.primaries.luminance_weights().as_vec3();
     let (mut sum, mut area) = (0.0_f64, 0.0_f64);
     for batch in &mesh.batches {
         let indices = &mesh.indices[batch.indices.start as usize..batch.indices.end as usize];
         for corners in indices.chunks_exact(3) {
-            let [a, b, c] =
-                [corners[0], corners[1], corners[2]].map(|i| mesh.positions[i as usize]);
+            let [a, b, c] = [corners[0], corners[1], corners[2]].map(|i| mesh.positions[i as usize]);
             let third = f64::from((b - a).cross(c - a).length()) / 6.0;
             for &corner in corners {
                 let luminance = weights.dot(radiance(corner as usize));
@@ -124,51 +98,8 @@ fn log_mean(mesh: &DisplayMesh, to_srgb: Mat3, radiance: impl Fn(usize) -> Rgb) 
         }
     }
     let mean = (sum / area).exp();
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "checked to be finite after it"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "checked to be finite after it")]
     Some(mean as f32).filter(|m| m.is_finite() && *m > 0.0)
-}
-
-/// Matrix from a scene's primaries to linear sRGB, grey staying grey.
-fn to_srgb(primaries: Primaries) -> Mat3 {
-    match primaries {
-        Primaries::Rec709 => Mat3::IDENTITY,
-        Primaries::Radiance => {
-            let third = 1.0 / 3.0;
-            let from = rgb_to_xyz(
-                [[0.640, 0.330], [0.290, 0.600], [0.150, 0.060]],
-                [third, third],
-            );
-            let to = rgb_to_xyz(
-                [[0.640, 0.330], [0.300, 0.600], [0.150, 0.060]],
-                [0.3127, 0.3290],
-            );
-            to.inverse() * bradford([third, third], [0.3127, 0.3290]) * from
-        }
-    }
-}
-
-/// XYZ of a chromaticity at Y = 1.
-fn xyz([x, y]: [f32; 2]) -> Vec3 {
-    Vec3::new(x / y, 1.0, (1.0 - x - y) / y)
-}
-
-/// The matrix that takes RGB with these primaries and white to XYZ (SMPTE RP 177).
-fn rgb_to_xyz(primaries: [[f32; 2]; 3], white: [f32; 2]) -> Mat3 {
-    let unscaled = Mat3::from_cols(xyz(primaries[0]), xyz(primaries[1]), xyz(primaries[2]));
-    unscaled * Mat3::from_diagonal(unscaled.inverse() * xyz(white))
-}
-
-/// Chromatic adaptation between whites with the linear Bradford transform (ICC.1:2022, annex E).
-fn bradford(from: [f32; 2], to: [f32; 2]) -> Mat3 {
-    let cone = Mat3::from_cols(
-        Vec3::new(0.8951, -0.7502, 0.0389),
-        Vec3::new(0.2664, 1.7135, -0.0685),
-        Vec3::new(-0.1614, 0.0367, 1.0296),
-    );
-    cone.inverse() * Mat3::from_diagonal((cone * xyz(to)) / (cone * xyz(from))) * cone
 }
 
 #[cfg(test)]
@@ -176,20 +107,7 @@ mod tests {
     use super::*;
     use crate::display::Batch;
     use glam::Vec2;
-
-    #[test]
-    fn grey_stays_grey() {
-        let grey = to_srgb(Primaries::Radiance) * Vec3::splat(0.5);
-        assert!(
-            (grey - Vec3::splat(0.5)).abs().max_element() < 1e-5,
-            "neutral moved to {grey}"
-        );
-        let green = to_srgb(Primaries::Radiance) * Vec3::Y;
-        assert!(
-            green.x < 0.0,
-            "the wider green lies outside sRGB, got {green}"
-        );
-    }
+    use hr_scene::Primaries;
 
     #[test]
     fn the_key_is_middle_grey() {
@@ -199,45 +117,24 @@ mod tests {
 
     #[test]
     fn curve_rises_and_nonsense_is_black() {
-        let tone = Tone {
-            exposure: 1.0,
-            to_srgb: Mat3::IDENTITY,
-            curve: Curve::ACES_FIT,
-        };
+        let tone = Tone { exposure: 1.0, to_srgb: Mat3::IDENTITY, curve: Curve::ACES_FIT };
         let mut last = -1.0;
         for step in 0..200 {
             let y = tone.curve.at(0.02 * step as f32);
-            assert!(
-                y >= last && (0.0..=1.0).contains(&y),
-                "not monotone at step {step}: {last} to {y}"
-            );
+            assert!(y >= last && (0.0..=1.0).contains(&y), "not monotone at step {step}: {last} to {y}");
             last = y;
         }
         let white = tone.apply(Rgb::splat(f32::INFINITY));
-        assert!(
-            (white - Vec3::ONE).abs().max_element() < 1e-6,
-            "infinitely bright is white, not {white}"
-        );
-        assert_eq!(
-            tone.apply(Rgb::splat(f32::NAN)),
-            Vec3::ZERO,
-            "not a number is black"
-        );
-        assert_eq!(
-            tone.apply(Rgb::splat(-1.0)),
-            Vec3::ZERO,
-            "negative is black"
-        );
+        assert!((white - Vec3::ONE).abs().max_element() < 1e-6, "infinitely bright is white, not {white}");
+        assert_eq!(tone.apply(Rgb::splat(f32::NAN)), Vec3::ZERO, "not a number is black");
+        assert_eq!(tone.apply(Rgb::splat(-1.0)), Vec3::ZERO, "negative is black");
     }
 
     #[test]
     fn exposure_does_not_depend_on_meshing() {
         // A unit square of radiance 2 beside one of radiance 8, the latter once as two triangles, once as many.
         let mesh = |fine: usize| {
-            let mut mesh = DisplayMesh {
-                primaries: Primaries::Rec709,
-                ..DisplayMesh::default()
-            };
+            let mut mesh = DisplayMesh { primaries: Primaries::Rec709, ..DisplayMesh::default() };
             let mut strip = |x: f32, width: f32, light: f32| {
                 let first = u32::try_from(mesh.positions.len()).expect("a small mesh");
                 for (dx, dy) in [(0.0, 0.0), (width, 0.0), (width, 1.0), (0.0, 1.0)] {
@@ -253,24 +150,14 @@ mod tests {
             let n = mesh.positions.len();
             (mesh.normals, mesh.tint) = (vec![Vec3::Z; n], vec![Rgb::ONE; n]);
             (mesh.emission, mesh.uv) = (vec![Rgb::ZERO; n], vec![Vec2::ZERO; n]);
-            mesh.batches = vec![Batch {
-                indices: 0..u32::try_from(mesh.indices.len()).expect("small"),
-                texture: None,
-            }];
+            mesh.batches = vec![Batch { indices: 0..u32::try_from(mesh.indices.len()).expect("small"), texture: None }];
             mesh
         };
         for fine in [1, 16] {
             let exposure = Tone::for_mesh(&mesh(fine)).exposure;
             // Geometric mean of 2 and 8 over equal areas is 4.
-            assert!(
-                (exposure - KEY / 4.0).abs() < 1e-5,
-                "{fine} strips gave {exposure}"
-            );
+            assert!((exposure - KEY / 4.0).abs() < 1e-5, "{fine} strips gave {exposure}");
         }
-        assert_eq!(
-            Tone::for_mesh(&DisplayMesh::default()).exposure,
-            1.0,
-            "nothing to expose for"
-        );
+        assert_eq!(Tone::for_mesh(&DisplayMesh::default()).exposure, 1.0, "nothing to expose for");
     }
 }

@@ -28,24 +28,10 @@ impl View {
         let forward = forward.try_normalize().unwrap_or(DVec3::X);
         let up = up.try_normalize().unwrap_or(DVec3::Z);
         let right = forward.cross(up);
-        let right = if right.length() < 1e-9 {
-            forward.any_orthonormal_vector()
-        } else {
-            right.normalize()
-        };
-        let fov_x = if fov_x.is_finite() {
-            fov_x.clamp(1.0, 170.0)
-        } else {
-            60.0
-        };
+        let right = if right.length() < 1e-9 { forward.any_orthonormal_vector() } else { right.normalize() };
+        let fov_x = if fov_x.is_finite() { fov_x.clamp(1.0, 170.0) } else { 60.0 };
         let eye = if eye.is_finite() { eye } else { DVec3::ZERO };
-        Self {
-            eye,
-            right,
-            up: right.cross(forward),
-            forward,
-            fov_x,
-        }
+        Self { eye, right, up: right.cross(forward), forward, fov_x }
     }
 
     /// What a camera shows.
@@ -70,22 +56,13 @@ impl View {
         let limit = std::f64::consts::FRAC_PI_2 - STEEPEST;
         let pitch = pitch.clamp(-limit, limit);
         // Looking along the vertical, the top of the picture says where forward is.
-        let level = |v: DVec3| {
-            (v - up * v.dot(up))
-                .try_normalize()
-                .filter(|_| (v - up * v.dot(up)).length() > 1e-6)
-        };
+        let level = |v: DVec3| (v - up * v.dot(up)).try_normalize().filter(|_| (v - up * v.dot(up)).length() > 1e-6);
         let ahead = level(self.forward)
             .or_else(|| level(self.up * -self.forward.dot(up).signum()))
             .unwrap_or_else(|| up.any_orthonormal_vector());
         let (sin, cos) = right.sin_cos();
         let ahead = ahead * cos + ahead.cross(up) * sin;
-        Self::looking(
-            self.eye,
-            ahead * pitch.cos() + up * pitch.sin(),
-            up,
-            self.fov_x,
-        )
+        Self::looking(self.eye, ahead * pitch.cos() + up * pitch.sin(), up, self.fov_x)
     }
 
     /// Horizontal and vertical scale of the projection (cotangents of half the fields of view) for a picture of
@@ -101,12 +78,7 @@ impl View {
         let side = |across: DVec3, scale: f64| (self.forward + across * scale).as_vec3();
         Sight {
             eye: (self.eye - origin).as_vec3(),
-            sides: [
-                side(self.right, x),
-                side(-self.right, x),
-                side(self.up, y),
-                side(-self.up, y),
-            ],
+            sides: [side(self.right, x), side(-self.right, x), side(self.up, y), side(-self.up, y)],
         }
     }
 }
@@ -118,22 +90,12 @@ mod tests {
     #[test]
     fn sides_bound_the_field_of_view() {
         let view = View::looking(DVec3::ZERO, DVec3::X, DVec3::Z, 90.0);
-        let inside = |p: DVec3, aspect: f64| {
-            view.sight(DVec3::ZERO, aspect)
-                .sides
-                .iter()
-                .all(|s| s.dot(p.as_vec3()) >= 0.0)
-        };
-        assert!(
-            inside(DVec3::new(1.0, 0.99, 0.0), 2.0),
-            "just left of the right edge"
-        );
+        let inside =
+            |p: DVec3, aspect: f64| view.sight(DVec3::ZERO, aspect).sides.iter().all(|s| s.dot(p.as_vec3()) >= 0.0);
+        assert!(inside(DVec3::new(1.0, 0.99, 0.0), 2.0), "just left of the right edge");
         assert!(!inside(DVec3::new(1.0, 1.01, 0.0), 2.0), "just beyond it");
         // Twice as wide as high: the tangent of half the vertical angle is 1/2.
-        assert!(
-            inside(DVec3::new(1.0, 0.0, 0.49), 2.0),
-            "just below the top"
-        );
+        assert!(inside(DVec3::new(1.0, 0.0, 0.49), 2.0), "just below the top");
         assert!(!inside(DVec3::new(1.0, 0.0, 0.51), 2.0), "just above it");
         assert!(!inside(DVec3::NEG_X, 2.0), "behind");
     }
@@ -142,38 +104,19 @@ mod tests {
     fn turning_keeps_the_horizon_and_stops_short_of_the_pole() {
         let view = View::looking(DVec3::ZERO, DVec3::X, DVec3::new(0.0, 0.3, 1.0), 60.0);
         let right = view.turned(std::f64::consts::FRAC_PI_2, 0.0, DVec3::Z);
-        assert!(
-            (right.forward - DVec3::NEG_Y).length() < 1e-12,
-            "right of x, z up, is −y: {}",
-            right.forward
-        );
+        assert!((right.forward - DVec3::NEG_Y).length() < 1e-12, "right of x, z up, is −y: {}", right.forward);
         assert!(right.right.z.abs() < 1e-12, "the camera's roll is gone");
         let high = view.turned(0.0, 9.0, DVec3::Z);
-        assert!(
-            high.forward.z > 0.99 && high.forward.x > 0.0,
-            "not over the top: {}",
-            high.forward
-        );
-        let down =
-            View::looking(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 60.0).turned(0.0, 0.5, DVec3::Z);
-        assert!(
-            down.forward.y > 0.0 && down.forward.is_finite(),
-            "from straight down, up is toward the top: {down:?}"
-        );
+        assert!(high.forward.z > 0.99 && high.forward.x > 0.0, "not over the top: {}", high.forward);
+        let down = View::looking(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 60.0).turned(0.0, 0.5, DVec3::Z);
+        assert!(down.forward.y > 0.0 && down.forward.is_finite(), "from straight down, up is toward the top: {down:?}");
     }
 
     #[test]
     fn degenerate_cameras_still_see() {
-        for (forward, up) in [
-            (DVec3::ZERO, DVec3::ZERO),
-            (DVec3::Z, DVec3::Z),
-            (DVec3::NAN, DVec3::X),
-        ] {
+        for (forward, up) in [(DVec3::ZERO, DVec3::ZERO), (DVec3::Z, DVec3::Z), (DVec3::NAN, DVec3::X)] {
             let view = View::looking(DVec3::NAN, forward, up, f64::NAN);
-            assert!(
-                view.right.is_finite() && view.up.is_finite() && view.eye.is_finite(),
-                "{forward} {up}: {view:?}"
-            );
+            assert!(view.right.is_finite() && view.up.is_finite() && view.eye.is_finite(), "{forward} {up}: {view:?}");
         }
     }
 
@@ -184,15 +127,8 @@ mod tests {
         let sight = view.sight(DVec3::ZERO, 1.6);
         for corner in 0..8 {
             let pick = |bit: i32, a: f64, b: f64| if corner & bit == 0 { a } else { b };
-            let p = DVec3::new(
-                pick(1, low.x, high.x),
-                pick(2, low.y, high.y),
-                pick(4, low.z, high.z),
-            );
-            let seen = sight
-                .sides
-                .iter()
-                .all(|s| s.dot(p.as_vec3() - sight.eye) >= 0.0);
+            let p = DVec3::new(pick(1, low.x, high.x), pick(2, low.y, high.y), pick(4, low.z, high.z));
+            let seen = sight.sides.iter().all(|s| s.dot(p.as_vec3() - sight.eye) >= 0.0);
             assert!(seen, "corner {p} is outside the picture");
         }
     }

@@ -69,18 +69,8 @@ impl Walker {
             None => View::around(low, high, up),
         };
         let diagonal = (high - low).length();
-        let pace = if diagonal > 0.0 {
-            diagonal / CROSSING
-        } else {
-            1.0
-        };
-        Self {
-            view,
-            up,
-            pace,
-            notches: 0.0,
-            held: Vec::new(),
-        }
+        let pace = if diagonal > 0.0 { diagonal / CROSSING } else { 1.0 };
+        Self { view, up, pace, notches: 0.0, held: Vec::new() }
     }
 
     /// Takes a key; whether it is one that moves.
@@ -168,10 +158,7 @@ mod tests {
 
     /// 8 long, so that the initial speed is 1 a second.
     fn walker() -> Walker {
-        let mesh = DisplayMesh {
-            positions: vec![Vec3::ZERO, Vec3::X * 8.0],
-            ..DisplayMesh::default()
-        };
+        let mesh = DisplayMesh { positions: vec![Vec3::ZERO, Vec3::X * 8.0], ..DisplayMesh::default() };
         let camera = Camera {
             eye: [1.0, 0.0, 0.0],
             target: [2.0, 0.0, 0.0],
@@ -180,30 +167,18 @@ mod tests {
             width: 4,
             height: 3,
         };
-        Walker::new(&Hall {
-            mesh,
-            cameras: vec![("first".into(), camera)],
-        })
+        Walker::new(&Hall { mesh, cameras: vec![("first".into(), camera)] })
     }
 
     #[test]
     fn keys_move_along_the_view() {
         let mut walker = walker();
-        assert!(
-            walker.key(KeyCode::KeyW, true) && walker.key(KeyCode::KeyD, true),
-            "both move"
-        );
+        assert!(walker.key(KeyCode::KeyW, true) && walker.key(KeyCode::KeyD, true), "both move");
         assert!(!walker.key(KeyCode::KeyH, true), "H does not");
         walker.advance(Duration::from_millis(100));
         let moved = walker.view.eye - DVec3::X;
-        assert!(
-            (moved.length() - 0.1).abs() < 1e-12,
-            "0.1 s at 1 a second, diagonal or not: {moved}"
-        );
-        assert!(
-            moved.x > 0.0 && moved.y < 0.0,
-            "forward is x, right is −y: {moved}"
-        );
+        assert!((moved.length() - 0.1).abs() < 1e-12, "0.1 s at 1 a second, diagonal or not: {moved}");
+        assert!(moved.x > 0.0 && moved.y < 0.0, "forward is x, right is −y: {moved}");
         walker.key(KeyCode::KeyW, false);
         assert!(walker.is_moving(), "D is still down");
         walker.release();
@@ -218,10 +193,6 @@ mod tests {
         walker.change_speed(f64::NAN);
         walker.advance(Duration::from_secs(100));
         let expected = 0.2 * SPEED_STEP.powi(2);
-        assert!(
-            (walker.view.eye.z - expected).abs() < 1e-9,
-            "climbed {}, not {expected}",
-            walker.view.eye.z
-        );
+        assert!((walker.view.eye.z - expected).abs() < 1e-9, "climbed {}, not {expected}", walker.view.eye.z);
     }
 }
