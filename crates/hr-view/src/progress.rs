@@ -17,18 +17,30 @@ pub struct Progress {
     begin: Instant,
 }
 
+/// Without a terminal, activities shorter than this are not worth a line; so a mistake in the input is the only line.
+const WORTH_A_LINE: Duration = Duration::from_secs(2);
+
 enum To {
     Bar(ProgressBar),
-    /// The activity that was written last, and where to.
-    Lines(Mutex<(String, Box<dyn Write + Send>)>),
+    Lines(Mutex<Lines>),
+}
+
+/// What has been and is to be written.
+struct Lines {
+    activity: String,
+    since: Instant,
+    /// Whether the activity has its line already.
+    written: bool,
+    patience: Duration,
+    out: Box<dyn Write + Send>,
 }
 
 impl Progress {
-    /// A bar where standard error is a terminal, else plain lines, one per activity.
+    /// A bar where standard error is a terminal, else plain lines, one per longer activity.
     #[must_use]
     pub fn new() -> Self {
         if !std::io::stderr().is_terminal() {
-            return Self::lines(Box::new(std::io::stderr()));
+            return Self::lines(Box::new(std::io::stderr()), WORTH_A_LINE);
         }
         let bar = ProgressBar::new(STEPS);
         let template = "{msg:46!} {bar:24} {percent:>3} %  {elapsed}";
@@ -37,8 +49,10 @@ impl Progress {
         Self { to: To::Bar(bar), begin: Instant::now() }
     }
 
-    fn lines(out: Box<dyn Write + Send>) -> Self {
-        Self { to: To::Lines(Mutex::new((String::new(), out))), begin: Instant::now() }
+    fn lines(out: Box<dyn Write + Send>, patience: Duration) -> Self {
+        let begin = Instant::now();
+        let lines = Lines { activity: String::new(), since: begin, written: true, patience, out };
+        Self { to: To::Lines(Mutex::new(lines)), begin }
     }
 
     /// Says what is being done and how far it is (0…1), and, where known, the relative error that the solution is
@@ -54,11 +68,15 @@ impl Progress {
                     None => activity.to_owned(),
                 });
             }
-            To::Lines(last) => {
-                let (last, out) = &mut *last.lock().unwrap_or_else(PoisonError::into_inner);
-                if last != activity {
-                    activity.clone_into(last);
-                    write(out, activity);
+            To::Lines(lines) => {
+                let lines = &mut *lines.lock().unwrap_or_else(PoisonError::into_inner);
+                if lines.activity != activity {
+                    activity.clone_into(&mut lines.activity);
+                    (lines.since, lines.written) = (Instant::now(), false);
+                }
+                if !lines.written && lines.since.elapsed() >= lines.patience {
+                    lines.written = true;
+                    write(&mut lines.out, activity);
                 }
             }
         }
@@ -68,7 +86,7 @@ impl Progress {
     pub fn say(&self, text: &str) {
         match &self.to {
             To::Bar(bar) => bar.suspend(|| write(&mut std::io::stderr(), text)),
-            To::Lines(last) => write(&mut last.lock().unwrap_or_else(PoisonError::into_inner).1, text),
+            To::Lines(lines) => write(&mut lines.lock().unwrap_or_else(PoisonError::into_inner).out, text),
         }
     }
 
@@ -123,7 +141,7 @@ mod tests {
     #[test]
     fn without_a_terminal_it_is_one_line_per_activity() {
         let out = Shared::default();
-        let progress = Progress::lines(Box::new(out.clone()));
+        let progress = Progress::lines(Box::new(out.clone()), Duration::ZERO);
         for i in 0..100_u8 {
             progress.at("refining", f32::from(i) / 100.0, Some(0.1));
         }
@@ -134,5 +152,14 @@ mod tests {
         let text = String::from_utf8(out.0.lock().unwrap_or_else(PoisonError::into_inner).clone());
         let expected = "hr-view: refining\nhr-view: one warning\nhr-view: transport\n";
         assert_eq!(text.as_deref(), Ok(expected), "three lines");
+    }
+
+    #[test]
+    fn what_is_over_soon_is_not_mentioned() {
+        let out = Shared::default();
+        let progress = Progress::lines(Box::new(out.clone()), Duration::from_secs(3600));
+        progress.at("loading", 0.0, None);
+        progress.at("refining", 0.5, None);
+        assert!(out.0.lock().unwrap_or_else(PoisonError::into_inner).is_empty(), "an hour has not passed");
     }
 }

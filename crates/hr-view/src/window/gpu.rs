@@ -92,7 +92,7 @@ impl Gpu {
     }
 
     /// Whether the device is the processor, where every sample of a pixel costs what a pixel costs.
-    fn is_slow(&self) -> bool {
+    pub(super) fn is_slow(&self) -> bool {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
     }
 
@@ -101,12 +101,12 @@ impl Gpu {
         if self.is_slow() { 1 } else { 16 }
     }
 
-    /// Samples per pixel for a target of this format.
+    /// Samples per pixel that a smooth picture in this format takes.
     pub(super) fn samples(&self, format: wgpu::TextureFormat) -> u32 {
         let can = |format| self.adapter.get_texture_format_features(format).flags;
         let resolves = can(format).contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
         let both = [format, DEPTH].into_iter().all(|f| can(f).sample_count_supported(SAMPLES));
-        if both && resolves && !self.is_slow() { SAMPLES } else { 1 }
+        if both && resolves { SAMPLES } else { 1 }
     }
 }
 

@@ -138,8 +138,7 @@ struct Targets {
 }
 
 impl Pass {
-    pub(super) fn new(gpu: &Gpu, scene: &SceneBuffers, format: wgpu::TextureFormat) -> Self {
-        let samples = gpu.samples(format);
+    pub(super) fn new(gpu: &Gpu, scene: &SceneBuffers, format: wgpu::TextureFormat, samples: u32) -> Self {
         let pipeline = |entry: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
             gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(entry),
@@ -189,11 +188,6 @@ impl Pass {
             glossy: pipeline("glossy_vertex", &[fixed.clone(), following]),
             targets: None,
         }
-    }
-
-    /// Samples per pixel.
-    pub(super) fn samples(&self) -> u32 {
-        self.samples
     }
 
     /// Draws the scene onto `output`, which has this pass's format and `size` ≥ 1 × 1.

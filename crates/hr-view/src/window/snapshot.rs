@@ -77,7 +77,14 @@ impl Snapshot {
         });
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Pass::new(gpu, scene, format).draw(gpu, scene, &mut encoder, &view, [width, height], frame);
+        Pass::new(gpu, scene, format, gpu.samples(format)).draw(
+            gpu,
+            scene,
+            &mut encoder,
+            &view,
+            [width, height],
+            frame,
+        );
         encoder.copy_texture_to_buffer(
             texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
