@@ -72,7 +72,8 @@ pub enum WindowError {
     },
 }
 
-/// Opens a window and walks until it is closed. Call it on the main thread, once per process (the window system's rule).
+/// Opens a window and walks until it is closed. Call it on the main thread, once per process: window systems want it
+/// so.
 ///
 /// # Errors
 /// [`WindowError::NoDisplay`] or [`WindowError::NoAdapter`], at once and before anything is shown, where there is no

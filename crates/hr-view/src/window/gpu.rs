@@ -12,8 +12,7 @@ const SAMPLES: u32 = 4;
 /// The depth buffer: floats, as reversed depth wants them.
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// The graphics systems to try, in order: OpenGL only where there is nothing else, for its drivers are slow to start and
-/// talk to the terminal.
+/// The graphics systems to try, in order: OpenGL only where there is nothing else, for its drivers are slow to start.
 const SYSTEMS: [Backends; 2] = [Backends::PRIMARY, Backends::GL];
 
 /// A device with its queue, and the first error that it reported outside of any call.

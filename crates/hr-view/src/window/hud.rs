@@ -181,7 +181,8 @@ fn line(context: &egui::Context, facts: &Facts<'_>, settings: &Settings) {
     let rate = if milliseconds > 0.0 { 1e3 / milliseconds } else { 0.0 };
     let camera = facts.camera.map(|name| format!(" · {name}")).unwrap_or_default();
     let text = format!(
-        "{}{camera}   {milliseconds:.1} ms  {rate:.0} fps   {} triangles   glossy {} of {} vertices in {:.1} ms   {:+.1} EV   H help",
+        "{}{camera}   {milliseconds:.1} ms  {rate:.0} fps   {} triangles   glossy {} of {} vertices in {:.1} ms   \
+         {:+.1} EV   H help",
         facts.scene,
         facts.triangles,
         facts.evaluated,
