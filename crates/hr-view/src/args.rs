@@ -161,10 +161,8 @@ mod tests {
         let nothing = run("");
         assert_eq!(nothing.scene, hr_scene::builtin::DEFAULT, "no scene is the default scene");
         assert_eq!(nothing.mode, Mode::Distributions, "the paper's mode is the default");
-        let all = run(
-            "a.mgf --camera c.json --image o.exr --mode gather --error 0.02 --time-budget 10 --threads 3 \
-             --stats s.json",
-        );
+        let all = run("a.mgf --camera c.json --image o.exr --mode gather --error 0.02 --time-budget 10 --threads 3 \
+             --stats s.json");
         assert_eq!(all.scene, "a.mgf", "scene");
         assert_eq!(all.camera, Some("c.json".into()), "camera");
         assert_eq!(all.image, Some("o.exr".into()), "image");
