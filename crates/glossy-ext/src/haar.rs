@@ -30,6 +30,8 @@
 //! distribution, zero everywhere, allocates nothing.
 //!
 //! # Limits
+//! Magnitudes from 10⁻³⁰ to 10³⁷ are kept; what is larger may become 0, never infinite or not a number.
+//!
 //! Indices have 15 bits: a distribution has up to 24,576 vertices, about 49,000 basis functions (level 6 everywhere,
 //! or finer in parts). Refinement stops there, coarse levels first, and says so ([`Projected::truncated`]).
 
@@ -47,7 +49,7 @@ use crate::Rgb;
 use glam::{DVec3, Vec3};
 use half::{Half3, decode, encode, scale_for};
 use hr_diffuse::Cone;
-use triangle::{ConeTest, Triangle, child_corners, face_corners, midpoints};
+use triangle::{ConeTest, Overlap, Triangle, child_corners, face_corners, midpoints};
 
 /// Deepest level of subdivision: triangles 0.02° across. Positions stay exact and barycentric coordinates, which
 /// lose a bit per level, keep more than what half floats can show.
@@ -91,6 +93,11 @@ impl Node {
     #[inline]
     fn is_divided(self) -> bool {
         self.mids().iter().all(|&m| m != Self::NO_VERTEX)
+    }
+
+    #[inline]
+    fn is_childless(self) -> bool {
+        self.0 >> 60 == 0
     }
 
     /// Index of a child's node.
@@ -168,15 +175,15 @@ impl Haar {
         let mut node = self.root(negative);
         while let Some(index) = node {
             let here = self.nodes[index];
-            if !here.is_divided() {
+            if here.is_childless() && !here.is_divided() {
                 let values = corners.map(|v| self.vertex(v));
                 let child = descend(&mut at);
-                let [a, b, c] = child_corners(values, self.mid_values(values, here), child);
+                let [a, b, c] = child.corners(values, self.mid_values(values, here));
                 return interpolate(at, a, b, c) * self.scale;
             }
             let child = descend(&mut at);
-            corners = child_corners(corners, here.mids(), child);
-            node = here.child(child);
+            corners = child.corners(corners, here.mids());
+            node = here.child(child.index());
         }
         let [a, b, c] = corners.map(|v| self.vertex(v));
         interpolate(at, a, b, c) * self.scale
@@ -190,22 +197,35 @@ impl Haar {
             return (Rgb::ZERO, Rgb::ZERO);
         }
         let test = ConeTest::new(cone);
-        let mut low = Rgb::MAX;
-        let mut high = Rgb::MIN;
-        self.pieces(
-            &mut |visit| visit.triangle.touches(&test),
-            &mut |triangle, values| {
-                bound_piece(
-                    triangle,
-                    values,
-                    cone,
-                    &test,
-                    PIECE_SPLITS,
-                    &mut low,
-                    &mut high,
-                );
-            },
-        );
+        let (mut low, mut high) = (Rgb::MAX, Rgb::MIN);
+        let (mut low_inside, mut high_inside) = (low, high);
+        let enter = &mut |visit: &Visit| match visit.triangle.overlap(&test) {
+            Overlap::Apart => false,
+            Overlap::Partial => true,
+            Overlap::Inside => {
+                self.vertices_below(visit.vertices, visit.node, &mut |v| {
+                    low_inside = low_inside.min(v);
+                    high_inside = high_inside.max(v);
+                });
+                false
+            }
+        };
+        self.pieces(enter, &mut |triangle, values| {
+            bound_piece(
+                triangle,
+                values,
+                cone,
+                &test,
+                PIECE_SPLITS,
+                &mut low,
+                &mut high,
+            );
+        });
+        (low, high) = (low.min(low_inside), high.max(high_inside));
+        if low.cmpgt(high).any() {
+            // No cone at all: one of its numbers is not a number.
+            return self.bounds(&Cone::SPHERE);
+        }
         // Rounding in the interpolation, a few units in the last place of the largest value involved.
         let slack = low.abs().max(high.abs()) * (4.0 * f32::EPSILON);
         ((low - slack) * self.scale, (high + slack) * self.scale)
@@ -301,6 +321,25 @@ impl Haar {
         }
     }
 
+    /// Visits the values at all vertices of a triangle, some more than once.
+    fn vertices_below(&self, vertices: [u16; 3], node: Option<usize>, visit: &mut impl FnMut(Rgb)) {
+        for vertex in vertices {
+            visit(self.vertex(vertex));
+        }
+        if let Some(index) = node {
+            self.mids_below(self.nodes[index], visit);
+        }
+    }
+
+    fn mids_below(&self, node: Node, visit: &mut impl FnMut(Rgb)) {
+        for mid in node.mids().into_iter().filter(|&m| m != Node::NO_VERTEX) {
+            visit(self.vertex(mid));
+        }
+        for child in (0..4).filter_map(|child| node.child(child)) {
+            self.mids_below(self.nodes[child], visit);
+        }
+    }
+
     /// The directions of the vertices (on the octahedron, not normalised), in the order of storage.
     fn positions(&self) -> Vec<Vec3> {
         let mut positions = vec![Vec3::ZERO; self.vertices.len()];
@@ -388,20 +427,49 @@ impl Haar {
     }
 }
 
-/// One step down: which child holds the point, and its barycentric coordinates there.
-#[inline]
-fn descend(at: &mut Vec3) -> usize {
-    let twice = *at + *at;
-    let corner = twice.cmpge(Vec3::ONE).bitmask();
-    if corner == 0 {
-        *at = Vec3::ONE - twice;
-        return 3;
+/// Which child holds a point: the one at corner 0, 1, 2, or the one in the middle if none is set.
+///
+/// A look-up takes a step for each level, and which way it goes is not to be predicted: flags and selection instead
+/// of an index and branches take half the time.
+#[derive(Clone, Copy)]
+struct Which(bool, bool, bool);
+
+impl Which {
+    #[inline]
+    fn index(self) -> usize {
+        3 - 3 * usize::from(self.0) - 2 * usize::from(self.1) - usize::from(self.2)
     }
-    // The lowest bit set; two are only where a midpoint is a corner of either child.
-    let child = corner.trailing_zeros() as usize;
-    *at = twice;
-    at[child] -= 1.0;
-    child
+
+    /// As [`child_corners`].
+    #[inline]
+    fn corners<T: Copy>(self, corners: [T; 3], mids: [T; 3]) -> [T; 3] {
+        let Self(is_0, is_1, is_2) = self;
+        let select = |corner: T, a: (bool, T), b: (bool, T), middle: T, here: bool| {
+            let other = if a.0 { a.1 } else { middle };
+            let other = if b.0 { b.1 } else { other };
+            if here { corner } else { other }
+        };
+        [
+            select(corners[0], (is_1, mids[2]), (is_2, mids[1]), mids[0], is_0),
+            select(corners[1], (is_0, mids[2]), (is_2, mids[0]), mids[1], is_1),
+            select(corners[2], (is_0, mids[1]), (is_1, mids[0]), mids[2], is_2),
+        ]
+    }
+}
+
+/// One step down: which child holds the point, and the point's barycentric coordinates there.
+#[inline]
+fn descend(at: &mut Vec3) -> Which {
+    let twice = *at + *at;
+    // No more than one, also where a midpoint is a corner of either.
+    let is_0 = twice.x >= 1.0;
+    let is_1 = (twice.y >= 1.0) & !is_0;
+    let is_2 = (twice.z >= 1.0) & !is_0 & !is_1;
+    let middle = !(is_0 | is_1 | is_2);
+    // At a corner 2p − 1 and twice the others; in the middle 1 − 2p.
+    let one = |flag: bool| f32::from(u8::from(flag | middle));
+    *at = (twice - Vec3::new(one(is_0), one(is_1), one(is_2))).abs();
+    Which(is_0, is_1, is_2)
 }
 
 /// Linear interpolation. Coordinates are never negative, but their sum drifts from 1 by the rounding of the first

@@ -124,16 +124,25 @@ pub(crate) mod tests {
 
     #[test]
     fn room_shells_face_inward() {
-        // The faces that make up the shell of each scene, and a point in the free middle.
-        let shells = [("furnace", 6, DVec3::ZERO), ("empty-room", 6, DVec3::new(0.5, 1.2, 1.9))];
-        for (name, faces, inside) in shells {
+        // The materials that make up the shell of each scene, how many faces, and a point in the free middle.
+        let bare: &[&str] = &["wall", "floor_tile", "wallpaint"];
+        let furnished: &[&str] =
+            &["plank", "plank light", "plank dark", "ceiling", "white wall", "terracotta wall", "teal wall", "sky"];
+        for (name, materials, faces, inside) in [
+            ("furnace", bare, 6, DVec3::ZERO),
+            ("empty-room", bare, 6, DVec3::new(0.5, 1.2, 1.9)),
+            // 40 planks, the ceiling, three whole walls, four parts of the back wall, three reveals, the sky.
+            ("room", furnished, 52, DVec3::new(4.1, 2.2, 1.3)),
+        ] {
             let s = scene(name).expect(name);
             let mut seen = 0;
-            for (middle, normal) in s.surfaces.iter().filter_map(|s| middle_and_normal(&s.shape)) {
+            for surface in &s.surfaces {
+                let shell = materials.contains(&s.materials[surface.material as usize].name.as_str());
+                let Some((middle, normal)) = middle_and_normal(&surface.shape).filter(|_| shell) else { continue };
                 seen += 1;
                 assert!(normal.dot(inside - middle) > 0.0, "{name}: the face at {middle} looks inward");
             }
-            assert_eq!(seen, faces, "{name}: faces");
+            assert_eq!(seen, faces, "{name}: faces of the shell");
         }
     }
 

@@ -25,17 +25,13 @@ pub enum SceneError {
         mend: String,
     },
     /// There is nothing to light.
-    #[error(
-        "{name}: the scene has no surface; add at least one face or curved surface of non-zero area"
-    )]
+    #[error("{name}: the scene has no surface; add at least one face or curved surface of non-zero area")]
     Empty {
         /// Scene or file name.
         name: String,
     },
     /// Neither a file of a known kind nor a built-in scene.
-    #[error(
-        "'{name}' is neither a .mgf, .gltf, .glb or .obj file nor a built-in scene; built-in scenes: {known}"
-    )]
+    #[error("'{name}' is neither a .mgf, .gltf, .glb or .obj file nor a built-in scene; built-in scenes: {known}")]
     Unknown {
         /// What was asked for.
         name: String,

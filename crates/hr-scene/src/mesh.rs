@@ -41,9 +41,7 @@ pub(crate) struct Face {
 
 impl Face {
     pub(crate) fn triangle([a, b, c]: [u32; 3]) -> Self {
-        Self {
-            corners: [a, b, c, c],
-        }
+        Self { corners: [a, b, c, c] }
     }
 
     fn is_triangle(self) -> bool {
@@ -53,15 +51,7 @@ impl Face {
     /// The same seen from the other side.
     fn turned(self) -> Self {
         let [a, b, c, d] = self.corners;
-        if self.is_triangle() {
-            Self {
-                corners: [a, c, b, b],
-            }
-        } else {
-            Self {
-                corners: [a, d, c, b],
-            }
-        }
+        if self.is_triangle() { Self { corners: [a, c, b, b] } } else { Self { corners: [a, d, c, b] } }
     }
 }
 
@@ -131,9 +121,7 @@ pub(crate) fn merge(vertices: &Vertices, triangles: &[[u32; 3]]) -> Vec<Face> {
                     if used[j] || (only_next && j != i + 1) {
                         continue;
                     }
-                    if let Some(quad) =
-                        parallelogram(vertices, &triangles[i], e, &triangles[j], f, skew)
-                    {
+                    if let Some(quad) = parallelogram(vertices, &triangles[i], e, &triangles[j], f, skew) {
                         (used[i], used[j]) = (true, true);
                         quad_of[i.min(j)] = Some((i.max(j), quad));
                     }
@@ -154,14 +142,7 @@ pub(crate) fn merge(vertices: &Vertices, triangles: &[[u32; 3]]) -> Vec<Face> {
 
 /// The parallelogram made of triangle `s` and triangle `t` that share the edges `e` and `f`, if it is one; `skew` is
 /// the largest |cosine| of its angles.
-fn parallelogram(
-    v: &Vertices,
-    s: &[u32; 3],
-    e: usize,
-    t: &[u32; 3],
-    f: usize,
-    skew: f64,
-) -> Option<[u32; 4]> {
+fn parallelogram(v: &Vertices, s: &[u32; 3], e: usize, t: &[u32; 3], f: usize, skew: f64) -> Option<[u32; 4]> {
     let (b, d, a) = (s[e], s[(e + 1) % 3], s[(e + 2) % 3]);
     let (d2, b2, c) = (t[f], t[(f + 1) % 3], t[(f + 2) % 3]);
     let corners = [a, b, c, d];
@@ -176,47 +157,39 @@ fn parallelogram(
     (fits && v.alike(b, b2) && v.alike(d, d2) && v.affine(corners)).then_some(corners)
 }
 
-/// Places faces in the scene. `attributes`: keep texture coordinates and vertex colours.
-pub(crate) fn place(
-    scene: &mut Scene,
-    warnings: &mut Warnings,
-    vertices: &Vertices,
-    faces: &[Face],
-    transform: &DMat4,
-    material: u32,
-    attributes: bool,
-    whence: &str,
-) {
+/// Faces of one material in the space of their mesh, ready to be placed.
+pub(crate) struct Part {
+    pub(crate) vertices: Vertices,
+    pub(crate) faces: Vec<Face>,
+    pub(crate) material: u32,
+    /// Whether texture coordinates and vertex colours are kept.
+    pub(crate) attributes: bool,
+    /// Where it stands in the file, for warnings.
+    pub(crate) whence: String,
+}
+
+/// Adds an instance of a part to the scene.
+pub(crate) fn place(scene: &mut Scene, warnings: &mut Warnings, part: &Part, transform: &DMat4) {
+    let Part { vertices, faces, material, attributes, whence } = part;
     let m = DMat3::from_mat4(*transform);
     // The cofactor matrix is the inverse transpose times the determinant, and is there for flat scalings too.
-    let cofactor = DMat3::from_cols(
-        m.y_axis.cross(m.z_axis),
-        m.z_axis.cross(m.x_axis),
-        m.x_axis.cross(m.y_axis),
-    );
+    let cofactor = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
     let mirrored = m.determinant() < 0.0;
     let side = if mirrored { -1.0 } else { 1.0 };
     for face in faces {
         let face = if mirrored { face.turned() } else { *face };
         let index = face.corners.map(|i| i as usize);
         let p = index.map(|i| transform.transform_point3(vertices.positions[i]));
-        let (diagonal, other) = if face.is_triangle() {
-            (p[1] - p[0], p[2] - p[0])
-        } else {
-            (p[2] - p[0], p[3] - p[1])
-        };
+        let (diagonal, other) =
+            if face.is_triangle() { (p[1] - p[0], p[2] - p[0]) } else { (p[2] - p[0], p[3] - p[1]) };
         let normal = diagonal.cross(other);
         let area = normal.length();
         if !area.is_finite() {
-            warnings.add("face left out: a corner is not a finite number", || {
-                whence.to_owned()
-            });
+            warnings.add("face left out: a corner is not a finite number", || whence.clone());
             continue;
         }
-        if area <= DEGENERATE * diagonal.length_squared().max(other.length_squared())
-            || area < f64::MIN_POSITIVE
-        {
-            warnings.add("face left out: it has no area", || whence.to_owned());
+        if area <= DEGENERATE * diagonal.length_squared().max(other.length_squared()) || area < f64::MIN_POSITIVE {
+            warnings.add("face left out: it has no area", || whence.clone());
             continue;
         }
         let geometric = (normal / area).as_vec3();
@@ -224,9 +197,7 @@ pub(crate) fn place(
         if !vertices.normals.is_empty() {
             let mut bad = false;
             let normals = index.map(|i| {
-                let n = (cofactor * vertices.normals[i].as_dvec3() * side)
-                    .normalize_or_zero()
-                    .as_vec3();
+                let n = (cofactor * vertices.normals[i].as_dvec3() * side).normalize_or_zero().as_vec3();
                 if n.is_finite() && n.dot(geometric) > 0.0 {
                     n
                 } else {
@@ -235,33 +206,22 @@ pub(crate) fn place(
                 }
             });
             if bad {
-                warnings.add(
-                    "shading normal replaced by the face's: it is zero or points to the back",
-                    || whence.to_owned(),
-                );
+                warnings
+                    .add("shading normal replaced by the face's: it is zero or points to the back", || whence.clone());
             }
             if normals.iter().any(|n| n.dot(geometric) < 1.0 - FLAT) {
                 shape_normals = Some(normals);
             }
         }
-        if attributes {
+        if *attributes {
             scene.attributes.push(SurfaceAttributes {
                 surface: scene.surfaces.len() as u32,
                 uv: index.map(|i| vertices.uv.get(i).copied().unwrap_or(Vec2::ZERO)),
                 color: index.map(|i| vertices.colors.get(i).copied().unwrap_or(Rgb::ONE)),
             });
         }
-        let shape = if face.is_triangle() {
-            Shape::Triangle([p[0], p[1], p[2]])
-        } else {
-            Shape::Quad(p)
-        };
-        scene.surfaces.push(Surface {
-            shape,
-            flip: false,
-            material,
-            shading_normals: shape_normals,
-        });
+        let shape = if face.is_triangle() { Shape::Triangle([p[0], p[1], p[2]]) } else { Shape::Quad(p) };
+        scene.surfaces.push(Surface { shape, flip: false, material: *material, shading_normals: shape_normals });
     }
 }
 
@@ -274,14 +234,10 @@ pub(crate) fn mean_base_colors(scene: &Scene) -> Vec<Option<Rgb>> {
             continue;
         };
         let (area, corners): (f64, &[Vec2]) = match &surface.shape {
-            Shape::Triangle([a, b, c]) => (
-                0.5 * (*b - *a).cross(*c - *a).length(),
-                &[Vec2::ZERO, Vec2::X, Vec2::Y],
-            ),
-            Shape::Quad([a, b, c, d]) => (
-                0.5 * (*c - *a).cross(*d - *b).length(),
-                &[Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
-            ),
+            Shape::Triangle([a, b, c]) => (0.5 * (*b - *a).cross(*c - *a).length(), &[Vec2::ZERO, Vec2::X, Vec2::Y]),
+            Shape::Quad([a, b, c, d]) => {
+                (0.5 * (*c - *a).cross(*d - *b).length(), &[Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y])
+            }
             _ => continue,
         };
         if let Some(color) = scene.mean_base_color(attributes.surface, corners)
@@ -291,31 +247,28 @@ pub(crate) fn mean_base_colors(scene: &Scene) -> Vec<Option<Rgb>> {
             *weight += area;
         }
     }
-    sums.into_iter()
-        .map(|(sum, area)| (area > 0.0).then(|| (sum / area).as_vec3()))
-        .collect()
+    sums.into_iter().map(|(sum, area)| (area > 0.0).then(|| (sum / area).as_vec3())).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn at(positions: &[[f64; 3]]) -> Vertices {
+        Vertices { positions: positions.iter().map(|p| DVec3::from(*p)).collect(), ..Vertices::default() }
+    }
+
     fn grid(n: u32) -> (Vertices, Vec<[u32; 3]>) {
         let mut vertices = Vertices::default();
         for j in 0..=n {
             for i in 0..=n {
-                vertices
-                    .positions
-                    .push(DVec3::new(f64::from(i), f64::from(j), 0.0));
+                vertices.positions.push(DVec3::new(f64::from(i), f64::from(j), 0.0));
             }
         }
         let at = |i, j| j * (n + 1) + i;
         let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
         let triangles = cells.flat_map(|(i, j)| {
-            [
-                [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
-                [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
-            ]
+            [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
         });
         let triangles = triangles.collect();
         (vertices, triangles)
@@ -337,10 +290,7 @@ mod tests {
         assert_eq!(faces.len(), 49, "one quadrilateral per cell");
         for f in &faces {
             assert!(!f.is_triangle(), "every cell merges");
-            assert!(
-                (area(&v, f) - 1.0).abs() < 1e-12,
-                "unit squares, counter-clockwise, not skewed pairs"
-            );
+            assert!((area(&v, f) - 1.0).abs() < 1e-12, "unit squares, counter-clockwise, not skewed pairs");
         }
     }
 
@@ -357,64 +307,24 @@ mod tests {
 
     #[test]
     fn what_is_no_parallelogram_stays() {
-        let mut v = Vertices::default();
-        v.positions = [
-            [0.0, 0.0, 0.0],
-            [1.0, 0.0, 0.0],
-            [1.1, 1.0, 0.0],
-            [0.0, 1.0, 0.0],
-        ]
-        .map(DVec3::from)
-        .to_vec();
-        assert_eq!(
-            merge(&v, &[[0, 1, 2], [0, 2, 3]]).len(),
-            2,
-            "a trapezoid is two triangles"
-        );
+        let mut v = at(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.1, 1.0, 0.0], [0.0, 1.0, 0.0]]);
+        assert_eq!(merge(&v, &[[0, 1, 2], [0, 2, 3]]).len(), 2, "a trapezoid is two triangles");
         v.positions[2] = DVec3::new(1.0, 1.0, 0.1);
-        assert_eq!(
-            merge(&v, &[[0, 1, 2], [0, 2, 3]]).len(),
-            2,
-            "a bent quadrilateral is two triangles"
-        );
+        assert_eq!(merge(&v, &[[0, 1, 2], [0, 2, 3]]).len(), 2, "a bent quadrilateral is two triangles");
         v.positions[2] = DVec3::new(1.0, 1.0, 0.0);
-        assert_eq!(
-            merge(&v, &[[0, 1, 2], [0, 2, 3]]).len(),
-            1,
-            "a square is one"
-        );
-        assert_eq!(
-            merge(&v, &[[0, 1, 2], [0, 3, 2]]).len(),
-            2,
-            "two that face opposite ways are two"
-        );
+        assert_eq!(merge(&v, &[[0, 1, 2], [0, 2, 3]]).len(), 1, "a square is one");
+        assert_eq!(merge(&v, &[[0, 1, 2], [0, 3, 2]]).len(), 2, "two that face opposite ways are two");
         v.uv = vec![Vec2::ZERO, Vec2::X, Vec2::new(1.0, 0.9), Vec2::Y];
-        assert_eq!(
-            merge(&v, &[[0, 1, 2], [0, 2, 3]]).len(),
-            2,
-            "texture coordinates must be affine"
-        );
+        assert_eq!(merge(&v, &[[0, 1, 2], [0, 2, 3]]).len(), 2, "texture coordinates must be affine");
         v.uv[2] = Vec2::ONE;
         assert_eq!(merge(&v, &[[0, 1, 2], [0, 2, 3]]).len(), 1, "and are here");
     }
 
     #[test]
     fn zero_and_minus_zero_weld() {
-        let mut v = Vertices::default();
-        v.positions = [
-            [0.0, 0.0, 0.0],
-            [1.0, 0.0, 0.0],
-            [1.0, 1.0, 0.0],
-            [-0.0, 0.0, -0.0],
-            [1.0, 1.0, -0.0],
-            [0.0, 1.0, 0.0],
-        ]
-        .map(DVec3::from)
-        .to_vec();
-        assert_eq!(
-            merge(&v, &[[0, 1, 2], [3, 4, 5]]).len(),
-            1,
-            "signs of zero do not part an edge"
-        );
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]];
+        let others = [[-0.0, 0.0, -0.0], [1.0, 1.0, -0.0], [0.0, 1.0, 0.0]];
+        let v = at(&[corners, others].concat());
+        assert_eq!(merge(&v, &[[0, 1, 2], [3, 4, 5]]).len(), 1, "signs of zero do not part an edge");
     }
 }

@@ -14,7 +14,7 @@ mod polygon;
 #[cfg(test)]
 mod tests;
 
-use crate::mesh::{Face, MAX_SURFACES, Vertices, merge, place};
+use crate::mesh::{Face, MAX_SURFACES, Part, Vertices, merge, place};
 use crate::warnings::Warnings;
 use crate::{Primaries, Scene, SceneError};
 use glam::{DMat4, DVec3, Vec2, Vec3};
@@ -31,10 +31,7 @@ use std::str::SplitWhitespace;
 /// is wrong, [`SceneError::Empty`] where it has no polygon. Missing libraries, materials and images are only warned
 /// of; grey stands in for a missing material.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = std::fs::read(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
     from_bytes(&bytes, path)
 }
 
@@ -45,64 +42,35 @@ pub(crate) fn from_bytes(bytes: &[u8], path: &Path) -> Result<Scene, SceneError>
     for (line, statement) in statements(&String::from_utf8_lossy(bytes)) {
         reader.statement(line, &statement, &mut warnings)?;
     }
-    let name = path
-        .file_name()
-        .unwrap_or(path.as_os_str())
-        .to_string_lossy()
-        .into_owned();
-    let mut scene = Scene {
-        name,
-        primaries: Primaries::Rec709,
-        ..Scene::default()
-    };
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+    let mut scene = Scene { name, primaries: Primaries::Rec709, ..Scene::default() };
     let mut materials: HashMap<(Option<usize>, bool, bool), u32> = HashMap::new();
-    for group in &reader.groups {
+    for group in reader.groups {
         let mut faces = merge(&group.vertices, &group.triangles);
         faces.extend(&group.quads);
         if scene.surfaces.len() + faces.len() > MAX_SURFACES {
             return Err(SceneError::Syntax {
-                place: group.whence.clone(),
+                place: group.whence,
                 what: format!("the scene has more than {MAX_SURFACES} faces"),
                 mend: "simpler meshes would be right".to_owned(),
             });
         }
-        let (textured, colored) = (
-            !group.vertices.uv.is_empty(),
-            !group.vertices.colors.is_empty(),
-        );
+        let (textured, colored) = (!group.vertices.uv.is_empty(), !group.vertices.colors.is_empty());
         let source = group.material.and_then(|m| reader.library.materials.get(m));
         let textured = textured && source.is_some_and(|m| m.texture.is_some());
-        let material = *materials
-            .entry((group.material, textured, colored))
-            .or_insert_with(|| {
-                scene.materials.push(mtl::material(source, textured));
-                scene.materials.len() as u32 - 1
-            });
-        let transform = DMat4::IDENTITY;
-        let attributes = textured || colored;
-        let v = &group.vertices;
-        place(
-            &mut scene,
-            &mut warnings,
-            v,
-            &faces,
-            &transform,
-            material,
-            attributes,
-            &group.whence,
-        );
+        let material = *materials.entry((group.material, textured, colored)).or_insert_with(|| {
+            scene.materials.push(mtl::material(source, textured));
+            scene.materials.len() as u32 - 1
+        });
+        let Group { vertices, whence, .. } = group;
+        let part = Part { vertices, faces, material, attributes: textured || colored, whence };
+        place(&mut scene, &mut warnings, &part, &DMat4::IDENTITY);
     }
     if scene.surfaces.is_empty() {
         return Err(SceneError::Empty { name: scene.name });
     }
-    for (index, mean) in crate::mesh::mean_base_colors(&scene)
-        .into_iter()
-        .enumerate()
-    {
-        let key = materials
-            .iter()
-            .find(|(_, m)| **m as usize == index)
-            .map(|(key, _)| *key);
+    for (index, mean) in crate::mesh::mean_base_colors(&scene).into_iter().enumerate() {
+        let key = materials.iter().find(|(_, m)| **m as usize == index).map(|(key, _)| *key);
         if let (Some(mean), Some((material, ..))) = (mean, key) {
             let source = material.and_then(|m| reader.library.materials.get(m));
             scene.materials[index].reflector = mtl::reflector(source, mean);
@@ -132,14 +100,11 @@ fn statements(text: &str) -> impl Iterator<Item = (usize, String)> {
 
 /// A number of a statement.
 fn number(word: Option<&str>, place: impl FnOnce() -> String) -> Result<f64, SceneError> {
-    word.and_then(|w| w.parse().ok())
-        .ok_or_else(|| SceneError::Syntax {
-            place: place(),
-            what: word.map_or("a number is missing".to_owned(), |w| {
-                format!("'{w}' is no number")
-            }),
-            mend: "a decimal number would be right".to_owned(),
-        })
+    word.and_then(|w| w.parse().ok()).ok_or_else(|| SceneError::Syntax {
+        place: place(),
+        what: word.map_or("a number is missing".to_owned(), |w| format!("'{w}' is no number")),
+        mend: "a decimal number would be right".to_owned(),
+    })
 }
 
 /// Faces that share a material and the kind of attributes that they have.
@@ -185,21 +150,12 @@ impl<'a> Reader<'a> {
         format!("{}:{line}", self.path.display())
     }
 
-    fn statement(
-        &mut self,
-        line: usize,
-        statement: &str,
-        warnings: &mut Warnings,
-    ) -> Result<(), SceneError> {
+    fn statement(&mut self, line: usize, statement: &str, warnings: &mut Warnings) -> Result<(), SceneError> {
         let mut words = statement.split_whitespace();
         let Some(keyword) = words.next() else {
             return Ok(());
         };
-        let rest = statement
-            .trim_start()
-            .strip_prefix(keyword)
-            .unwrap_or("")
-            .trim();
+        let rest = statement.trim_start().strip_prefix(keyword).unwrap_or("").trim();
         match keyword {
             "v" => {
                 let [x, y, z] = self.numbers(&mut words, line)?;
@@ -221,9 +177,7 @@ impl<'a> Reader<'a> {
             }
             "vt" => {
                 let u = number(words.next(), || self.place(line))?;
-                let v = words
-                    .next()
-                    .map_or(Ok(0.0), |w| number(Some(w), || self.place(line)))?;
+                let v = words.next().map_or(Ok(0.0), |w| number(Some(w), || self.place(line)))?;
                 // Row 0 of an image is its top, but v goes up.
                 let uv = Vec2::new(u as f32, (1.0 - v) as f32);
                 self.uv.push(if uv.is_finite() { uv } else { Vec2::ZERO });
@@ -237,48 +191,33 @@ impl<'a> Reader<'a> {
                 let base = self.path.parent().unwrap_or(Path::new(""));
                 // A name may hold blanks, and several may follow: the whole line is tried first.
                 let whole = base.join(rest);
-                let files = if whole.is_file() {
-                    vec![whole]
-                } else {
-                    words.map(|name| base.join(name)).collect()
-                };
+                let files = if whole.is_file() { vec![whole] } else { words.map(|name| base.join(name)).collect() };
                 for file in files {
                     match std::fs::read(&file) {
                         Ok(bytes) => self.library.read(&bytes, &file, warnings)?,
-                        Err(e) => warnings.add(
-                            format!("material library '{}' cannot be read: {e}", file.display()),
-                            || self.place(line),
-                        ),
+                        Err(e) => warnings
+                            .add(format!("material library '{}' cannot be read: {e}", file.display()), || {
+                                self.place(line)
+                            }),
                     }
                 }
             }
             "usemtl" => {
                 self.material = self.library.index.get(rest).copied();
                 if self.material.is_none() {
-                    warnings.add(
-                        format!("there is no material '{rest}': grey is used"),
-                        || self.place(line),
-                    );
+                    warnings.add(format!("there is no material '{rest}': grey is used"), || self.place(line));
                 }
             }
             "curv" | "curv2" | "surf" => {
-                warnings.add("free-form curves and surfaces are left out", || {
-                    self.place(line)
-                });
+                warnings.add("free-form curves and surfaces are left out", || self.place(line));
             }
-            "p" | "l" => warnings.add("points and lines are left out: they have no area", || {
-                self.place(line)
-            }),
+            "p" | "l" => warnings.add("points and lines are left out: they have no area", || self.place(line)),
             _ => {}
         }
         Ok(())
     }
 
-    fn numbers<const N: usize>(
-        &self,
-        words: &mut SplitWhitespace,
-        line: usize,
-    ) -> Result<[f64; N], SceneError> {
+    fn numbers<const N: usize>(&self, words: &mut SplitWhitespace, line: usize) -> Result<[f64; N], SceneError> {
         let mut values = [0.0; N];
         for value in &mut values {
             *value = number(words.next(), || self.place(line))?;
@@ -286,19 +225,10 @@ impl<'a> Reader<'a> {
         Ok(values)
     }
 
-    fn face(
-        &mut self,
-        line: usize,
-        words: SplitWhitespace,
-        warnings: &mut Warnings,
-    ) -> Result<(), SceneError> {
-        let corners = words
-            .map(|w| self.corner(w, line))
-            .collect::<Result<Vec<_>, _>>()?;
+    fn face(&mut self, line: usize, words: SplitWhitespace, warnings: &mut Warnings) -> Result<(), SceneError> {
+        let corners = words.map(|w| self.corner(w, line)).collect::<Result<Vec<_>, _>>()?;
         if corners.len() < 3 {
-            warnings.add("a face with fewer than three corners is left out", || {
-                self.place(line)
-            });
+            warnings.add("a face with fewer than three corners is left out", || self.place(line));
             return Ok(());
         }
         let has_uv = corners.iter().all(|c| c[1].is_some());
@@ -322,33 +252,20 @@ impl<'a> Reader<'a> {
         let first = group.vertices.positions.len() as u32;
         group.vertices.positions.extend(&points);
         if has_uv {
-            group
-                .vertices
-                .uv
-                .extend(corners.iter().map(|c| self.uv[of(c[1])]));
+            group.vertices.uv.extend(corners.iter().map(|c| self.uv[of(c[1])]));
         }
         if has_normals {
-            group
-                .vertices
-                .normals
-                .extend(corners.iter().map(|c| self.normals[of(c[2])]));
+            group.vertices.normals.extend(corners.iter().map(|c| self.normals[of(c[2])]));
         }
         if has_colors {
-            group
-                .vertices
-                .colors
-                .extend(corners.iter().filter_map(|c| self.colors[of(c[0])]));
+            group.vertices.colors.extend(corners.iter().filter_map(|c| self.colors[of(c[0])]));
         }
         if points.len() == 4 && polygon::is_planar_convex(&points) {
-            group.quads.push(Face {
-                corners: [first, first + 1, first + 2, first + 3],
-            });
+            group.quads.push(Face { corners: [first, first + 1, first + 2, first + 3] });
             return Ok(());
         }
         let triangles = polygon::triangles(&points);
-        group
-            .triangles
-            .extend(triangles.iter().map(|t| t.map(|i| first + i)));
+        group.triangles.extend(triangles.iter().map(|t| t.map(|i| first + i)));
         if triangles.len() != points.len() - 2 {
             warnings.add(
                 "part of a polygon is left out: it crosses itself, or is not convex and has more than 256 corners",
@@ -374,12 +291,8 @@ impl<'a> Reader<'a> {
                     let what = ["v", "vt", "vn"].get(k).copied().unwrap_or("fourth");
                     return Err(SceneError::Syntax {
                         place: self.place(line),
-                        what: format!(
-                            "'{word}' has the {what} index '{part}', and {count} are known here"
-                        ),
-                        mend: format!(
-                            "1…{count}, or -1…-{count} from the last one, would be right"
-                        ),
+                        what: format!("'{word}' has the {what} index '{part}', and {count} are known here"),
+                        mend: format!("1…{count}, or -1…-{count} from the last one, would be right"),
                     });
                 }
             };

@@ -16,6 +16,9 @@ use std::sync::{Arc, OnceLock};
 /// ten milliseconds, however often a texture is repeated on one patch.
 const MAX_PERIMETER: f64 = (1 << 18) as f64;
 
+/// Perimeter in texels below which a texture is as good as linear, and the integral all rounding.
+const MIN_PERIMETER: f64 = 1e-5;
+
 /// Samples of an estimated mean. Quasi-random: an error of about 1/200 of the texture's contrast.
 const ESTIMATE_SAMPLES: u32 = 1 << 14;
 
@@ -80,12 +83,7 @@ impl Texels {
     #[must_use]
     pub fn new(width: u32, height: u32, data: Vec<Rgb>) -> Option<Self> {
         let count = (width as usize).checked_mul(height as usize)?;
-        (count > 0 && count == data.len()).then(|| Self {
-            width,
-            height,
-            data,
-            sums: OnceLock::new(),
-        })
+        (count > 0 && count == data.len()).then(|| Self { width, height, data, sums: OnceLock::new() })
     }
 
     /// Width in texels, ≥ 1.
@@ -121,19 +119,11 @@ impl Texels {
             let rows = [2 * y, (2 * y + 1).min(self.height - 1)];
             for x in 0..width {
                 let columns = [2 * x, (2 * x + 1).min(self.width - 1)];
-                let sum: Rgb = rows
-                    .iter()
-                    .flat_map(|&j| columns.map(|i| self.row(j)[i as usize]))
-                    .sum();
+                let sum: Rgb = rows.iter().flat_map(|&j| columns.map(|i| self.row(j)[i as usize])).sum();
                 data.push(sum * 0.25);
             }
         }
-        Self {
-            width,
-            height,
-            data,
-            sums: OnceLock::new(),
-        }
+        Self { width, height, data, sums: OnceLock::new() }
     }
 
     fn row(&self, j: u32) -> &[Rgb] {
@@ -186,10 +176,7 @@ impl Wrap {
 
     /// A position in texels moved to where the endless row looks alike and integers are safe to compute with.
     fn reduce(self, x: f64, n: u32) -> f64 {
-        self.period(n).map_or_else(
-            || x.clamp(-1.0, f64::from(n)),
-            |period| x.rem_euclid(period),
-        )
+        self.period(n).map_or_else(|| x.clamp(-1.0, f64::from(n)), |period| x.rem_euclid(period))
     }
 
     /// Sum of the texels 0…`i`−1 of the endless row, negative before 0, from the running sums of the given ones.
@@ -200,11 +187,7 @@ impl Wrap {
             Self::Repeat => total * i.div_euclid(n) as f64 + sums[i.rem_euclid(n) as usize],
             Self::Mirror => {
                 let rest = i.rem_euclid(2 * n);
-                let part = if rest <= n {
-                    sums[rest as usize]
-                } else {
-                    2.0 * total - sums[(2 * n - rest) as usize]
-                };
+                let part = if rest <= n { sums[rest as usize] } else { 2.0 * total - sums[(2 * n - rest) as usize] };
                 2.0 * total * i.div_euclid(2 * n) as f64 + part
             }
             Self::Clamp if i < 0 => sums[1] * i as f64,
@@ -218,11 +201,7 @@ impl Texture {
     /// A texture without a transform.
     #[must_use]
     pub fn new(texels: Arc<Texels>, wrap: [Wrap; 2]) -> Self {
-        Self {
-            texels,
-            transform: Mat3::IDENTITY,
-            wrap,
-        }
+        Self { texels, transform: Mat3::IDENTITY, wrap }
     }
 
     /// The linear colour at a texture coordinate: bilinear between texel centres, wrapped. Where a coordinate is
@@ -230,11 +209,7 @@ impl Texture {
     #[must_use]
     pub fn sample(&self, uv: Vec2) -> Rgb {
         let p = self.to_texels(uv);
-        if p.is_finite() {
-            self.bilinear(p)
-        } else {
-            self.mean()
-        }
+        if p.is_finite() { self.bilinear(p) } else { self.mean() }
     }
 
     /// Mean over the whole texture.
@@ -294,38 +269,21 @@ impl Texture {
 
     /// Mean over a triangle or parallelogram given in texels.
     fn mean_over_polygon(&self, points: &[DVec2]) -> Rgb {
-        let edges = || {
-            points
-                .iter()
-                .zip(points.iter().cycle().skip(1))
-                .map(|(&a, &b)| (a, b))
-        };
+        let edges = || points.iter().zip(points.iter().cycle().skip(1)).map(|(&a, &b)| (a, b));
         let perimeter: f64 = edges().map(|(a, b)| (b - a).abs().element_sum()).sum();
         // Taken about the first corner: exact enough however far from 0 the region lies.
-        let area: f64 = 0.5
-            * edges()
-                .map(|(a, b)| (a - points[0]).perp_dot(b - points[0]))
-                .sum::<f64>();
-        if perimeter > MAX_PERIMETER
-            || perimeter < 1e-5
-            || area.abs() < 1e-7 * perimeter * perimeter
-        {
+        let area: f64 = 0.5 * edges().map(|(a, b)| (a - points[0]).perp_dot(b - points[0])).sum::<f64>();
+        if !(MIN_PERIMETER..=MAX_PERIMETER).contains(&perimeter) || area.abs() < 1e-7 * perimeter * perimeter {
             return self.estimate(points, perimeter);
         }
         let shift = DVec2::new(
-            self.wrap[0]
-                .period(self.texels.width)
-                .map_or(0.0, |n| (points[0].x / n).floor() * n),
-            self.wrap[1]
-                .period(self.texels.height)
-                .map_or(0.0, |n| (points[0].y / n).floor() * n),
+            self.wrap[0].period(self.texels.width).map_or(0.0, |n| (points[0].x / n).floor() * n),
+            self.wrap[1].period(self.texels.height).map_or(0.0, |n| (points[0].y / n).floor() * n),
         );
         if (points[0] - shift).abs().max_element() > 1e9 {
             return self.estimate(points, perimeter);
         }
-        let integral: DVec3 = edges()
-            .map(|(a, b)| self.contour(a - shift, b - shift))
-            .sum();
+        let integral: DVec3 = edges().map(|(a, b)| self.contour(a - shift, b - shift)).sum();
         (integral / area).as_vec3().max(Rgb::ZERO)
     }
 
@@ -343,9 +301,7 @@ impl Texture {
             if to > from {
                 sum += self.piece(a, d, from, to);
             }
-            next.iter_mut()
-                .filter(|n| n.t <= to)
-                .for_each(Crossings::advance);
+            next.iter_mut().filter(|n| n.t <= to).for_each(Crossings::advance);
             from = to;
         }
         sum
@@ -362,16 +318,11 @@ impl Texture {
             let at = |i| row[self.wrap[0].index(i, self.texels.width) as usize].as_dvec3();
             // ∫ from texel 0 to texel i of a piecewise linear function is the sum of the texels before i plus
             // half of texel i less half of texel 0. The latter depends on y only: it cancels around a contour.
-            (
-                self.wrap[0].sum(i, self.texels.row_sums(j)) + 0.5 * at(i),
-                at(i),
-                at(i + 1),
-            )
+            (self.wrap[0].sum(i, self.texels.row_sums(j)) + 0.5 * at(i), at(i), at(i + 1))
         });
         let value = |t: f64| {
             let p = a + d * t - cell;
-            let [lower, upper] =
-                rows.map(|(sum, f0, f1)| sum + p.x * f0 + 0.5 * p.x * p.x * (f1 - f0));
+            let [lower, upper] = rows.map(|(sum, f0, f1)| sum + p.x * f0 + 0.5 * p.x * p.x * (f1 - f0));
             lower.lerp(upper, p.y)
         };
         let gauss = half / 3.0_f64.sqrt();
@@ -414,27 +365,14 @@ struct Crossings {
 
 impl Crossings {
     fn new(start: f64, slope: f64) -> Self {
-        let next = if slope > 0.0 {
-            start.floor() + 1.0
-        } else {
-            start.ceil() - 1.0
-        };
-        let mut this = Self {
-            start,
-            slope,
-            next,
-            t: 0.0,
-        };
+        let next = if slope > 0.0 { start.floor() + 1.0 } else { start.ceil() - 1.0 };
+        let mut this = Self { start, slope, next, t: 0.0 };
         this.update();
         this
     }
 
     fn update(&mut self) {
-        self.t = if self.slope == 0.0 {
-            f64::INFINITY
-        } else {
-            (self.next - self.start) / self.slope
-        };
+        self.t = if self.slope == 0.0 { f64::INFINITY } else { (self.next - self.start) / self.slope };
     }
 
     fn advance(&mut self) {
@@ -461,10 +399,7 @@ impl SurfaceAttributes {
 
     /// The corners' colour, where all have the same.
     fn uniform_color(&self) -> Option<Rgb> {
-        self.color
-            .iter()
-            .all(|c| *c == self.color[0])
-            .then_some(self.color[0])
+        self.color.iter().all(|c| *c == self.color[0]).then_some(self.color[0])
     }
 }
 
@@ -479,10 +414,7 @@ impl Scene {
     /// Attributes of a surface, if it has any.
     #[must_use]
     pub fn attributes_of(&self, surface: u32) -> Option<&SurfaceAttributes> {
-        let at = self
-            .attributes
-            .binary_search_by_key(&surface, |a| a.surface)
-            .ok()?;
+        let at = self.attributes.binary_search_by_key(&surface, |a| a.surface).ok()?;
         self.attributes.get(at)
     }
 
@@ -491,18 +423,15 @@ impl Scene {
     #[must_use]
     pub fn base_color(&self, surface: u32, u: f32, v: f32) -> Option<Rgb> {
         let (shape, attributes, material) = self.colored(surface)?;
-        let texel = material
-            .texture
-            .as_ref()
-            .map_or(Rgb::ONE, |t| t.sample(attributes.uv_at(shape, u, v)));
+        let texel = material.texture.as_ref().map_or(Rgb::ONE, |t| t.sample(attributes.uv_at(shape, u, v)));
         Some(material.base_color * texel * attributes.color_at(shape, u, v))
     }
 
     /// Mean of [`base_color`](Self::base_color) over a patch with three or four corners in (u, v), convex.
     ///
     /// Texture alone and vertex colours alone are integrated exactly where texture coordinates are affine in
-    /// (u, v), as on triangles and parallelograms; where both vary, the patch is cut into 64 or more pieces, each with one
-    /// vertex colour. `None` as for [`base_color`](Self::base_color), and for fewer than three corners.
+    /// (u, v), as on triangles and parallelograms; where both vary, the patch is cut into 64 or more pieces, each
+    /// with one vertex colour. `None` as for [`base_color`](Self::base_color), and for fewer than three corners.
     #[must_use]
     pub fn mean_base_color(&self, surface: u32, corners: &[Vec2]) -> Option<Rgb> {
         let (shape, attributes, material) = self.colored(surface)?;
@@ -518,20 +447,14 @@ impl Scene {
             }
             (None, None) => fan_mean(corners, |triangle| {
                 // Colours are at most quadratic: the three middles of the edges integrate them exactly.
-                let middles =
-                    [(0, 1), (1, 2), (2, 0)].map(|(i, j)| 0.5 * (triangle[i] + triangle[j]));
-                middles
-                    .map(|m| attributes.color_at(shape, m.x, m.y))
-                    .iter()
-                    .sum::<Rgb>()
-                    / 3.0
+                let middles = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| 0.5 * (triangle[i] + triangle[j]));
+                middles.map(|m| attributes.color_at(shape, m.x, m.y)).iter().sum::<Rgb>() / 3.0
             }),
             (Some(texture), None) => fan_mean(corners, |triangle| {
                 let sum: Rgb = pieces(triangle)
                     .map(|piece| {
                         let middle = (piece[0] + piece[1] + piece[2]) / 3.0;
-                        attributes.color_at(shape, middle.x, middle.y)
-                            * texture.mean_over(&piece.map(|p| uv(&p)))
+                        attributes.color_at(shape, middle.x, middle.y) * texture.mean_over(&piece.map(|p| uv(&p)))
                     })
                     .sum();
                 sum / (PRODUCT_STEPS * PRODUCT_STEPS) as f32
@@ -543,11 +466,7 @@ impl Scene {
     fn colored(&self, surface: u32) -> Option<(&Shape, &SurfaceAttributes, &crate::Material)> {
         let attributes = self.attributes_of(surface)?;
         let surface = self.surfaces.get(surface as usize)?;
-        Some((
-            &surface.shape,
-            attributes,
-            self.materials.get(surface.material as usize)?,
-        ))
+        Some((&surface.shape, attributes, self.materials.get(surface.material as usize)?))
     }
 }
 
@@ -566,15 +485,12 @@ fn fan_mean(corners: &[Vec2], mean: impl Fn([Vec2; 3]) -> Rgb) -> Rgb {
 /// A triangle cut into [`PRODUCT_STEPS`]² congruent ones.
 fn pieces([a, b, c]: [Vec2; 3]) -> impl Iterator<Item = [Vec2; 3]> {
     let n = PRODUCT_STEPS;
-    let at =
-        move |i: u32, j: u32| a + (b - a) * (i as f32 / n as f32) + (c - a) * (j as f32 / n as f32);
-    (0..n)
-        .flat_map(move |i| (0..n - i).map(move |j| (i, j)))
-        .flat_map(move |(i, j)| {
-            let upright = [at(i, j), at(i + 1, j), at(i, j + 1)];
-            let turned = (i + j + 1 < n).then(|| [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
-            std::iter::once(upright).chain(turned)
-        })
+    let at = move |i: u32, j: u32| a + (b - a) * (i as f32 / n as f32) + (c - a) * (j as f32 / n as f32);
+    (0..n).flat_map(move |i| (0..n - i).map(move |j| (i, j))).flat_map(move |(i, j)| {
+        let upright = [at(i, j), at(i + 1, j), at(i, j + 1)];
+        let turned = (i + j + 1 < n).then(|| [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+        std::iter::once(upright).chain(turned)
+    })
 }
 
 /// Most texels kept of one image (4096²); larger ones are halved until they fit.
@@ -583,9 +499,8 @@ const MAX_TEXELS: usize = 1 << 24;
 /// Decodes a PNG or JPEG image; `srgb`: its numbers are sRGB and turned to linear. Also says whether it was made
 /// smaller. The error is what is wrong with it.
 pub(crate) fn decode(bytes: &[u8], srgb: bool) -> Result<(Texels, bool), String> {
-    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|e| e.to_string())?;
+    let mut reader =
+        image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(1 << 15);
     limits.max_image_height = Some(1 << 15);
@@ -594,23 +509,12 @@ pub(crate) fn decode(bytes: &[u8], srgb: bool) -> Result<(Texels, bool), String>
     let linear = |c: f32| if srgb { srgb_to_linear(c) } else { c };
     let (width, height) = (image.width(), image.height());
     let data: Vec<Rgb> = match image.color() {
-        image::ColorType::L8
-        | image::ColorType::La8
-        | image::ColorType::Rgb8
-        | image::ColorType::Rgba8 => {
+        image::ColorType::L8 | image::ColorType::La8 | image::ColorType::Rgb8 | image::ColorType::Rgba8 => {
             let table: Vec<f32> = (0..=255_u8).map(|i| linear(f32::from(i) / 255.0)).collect();
             let at = |i: u8| table[usize::from(i)];
-            image
-                .to_rgb8()
-                .pixels()
-                .map(|p| Rgb::new(at(p.0[0]), at(p.0[1]), at(p.0[2])))
-                .collect()
+            image.to_rgb8().pixels().map(|p| Rgb::new(at(p.0[0]), at(p.0[1]), at(p.0[2]))).collect()
         }
-        _ => image
-            .to_rgb32f()
-            .pixels()
-            .map(|p| Rgb::from(p.0.map(linear)))
-            .collect(),
+        _ => image.to_rgb32f().pixels().map(|p| Rgb::from(p.0.map(linear))).collect(),
     };
     let mut texels = Texels::new(width, height, data).ok_or("it has no pixels")?;
     let large = texels.data.len() > MAX_TEXELS;
@@ -622,11 +526,7 @@ pub(crate) fn decode(bytes: &[u8], srgb: bool) -> Result<(Texels, bool), String>
 
 /// The sRGB transfer function of IEC 61966-2-1, to linear light; both in 0…1.
 fn srgb_to_linear(c: f32) -> f32 {
-    if c <= 0.04045 {
-        c / 12.92
-    } else {
-        ((c + 0.055) / 1.055).powf(2.4)
-    }
+    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]

@@ -3,8 +3,9 @@
 use crate::{Primaries, Rgb};
 use glam::{DMat3, DVec3};
 
-/// Exposed luminance of a picture's middle: what the [curve](filmic) prints as 18 % grey.
-const KEY: f64 = 0.130;
+/// Exposed luminance of a picture's middle: the key of a normally lit scene in E. Reinhard et al., "Photographic Tone
+/// Reproduction for Digital Images", 2002.
+const KEY: f64 = 0.18;
 
 /// Shares of the pixels, by luminance, that automatic exposure looks at: neither deep shadow nor lamps and windows,
 /// which would otherwise pull the whole picture up or down.
@@ -16,10 +17,11 @@ const BRIGHTEST: f64 = 1e6;
 /// How bright a picture is printed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Exposure {
-    /// From the picture itself: its log-average luminance, darkest 5 % and brightest 10 % left out, becomes middle grey.
+    /// From the picture itself: its log-average luminance, darkest 5 % and brightest 10 % left out, becomes
+    /// 0.18.
     #[default]
     Auto,
-    /// Radiance is multiplied by this factor (≥ 0); 1 prints a radiance of about 0.13 W/(m² sr) as middle grey.
+    /// Radiance is multiplied by this factor (≥ 0); 1 shows a radiance of 0.18 W/(m² sr) as that.
     Factor(f32),
 }
 
@@ -137,7 +139,8 @@ mod tests {
     fn curve_rises_from_black_to_white() {
         assert_eq!(filmic(0.0), 0.0, "black");
         assert_eq!(filmic(7.3), 1.0, "white point");
-        assert!((filmic(KEY) - 0.18).abs() < 5e-4, "the key is middle grey");
+        // 0.18 (2.51·0.18 + 0.03) / (0.18 (2.43·0.18 + 0.59) + 0.14)
+        assert!((filmic(0.18) - 0.266_90).abs() < 1e-5, "the key: {}", filmic(0.18));
         let mut last = 0.0;
         for k in 1..3000 {
             let y = filmic(f64::from(k) * 0.0024);

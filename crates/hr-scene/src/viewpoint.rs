@@ -472,6 +472,16 @@ mod tests {
     }
 
     #[test]
+    fn the_walk_through_the_room_touches_nothing() {
+        let scene = builtin::scene("room").expect("there");
+        let occluders = scene.occluders();
+        for (k, camera) in scene.walkthrough(60).iter().enumerate() {
+            let free = sphere_directions(200).map(|d| occluders.distance(camera.eye.into(), d)).fold(9.0, f64::min);
+            assert!(free > 0.3, "frame {k}: {free} m to the nearest surface");
+        }
+    }
+
+    #[test]
     fn walks_without_cameras_stay_inside() {
         for name in ["room", "empty-room"] {
             let scene = without_cameras(name);

@@ -19,8 +19,8 @@ impl Haar {
 
     /// The weighted sum Σ wᵢ hᵢ of distributions, such as those of the children of an element weighted by their
     /// share of its area. It is made on the union of the subdivisions, then coarsened wherever all of its values
-    /// over a triangle pass the refiner, keeping the energy; `offset` as in [`Known`](super::Known). Many sharp distributions
-    /// often average to a smooth one. Distributions with a weight that is zero or not finite are left out.
+    /// over a triangle pass the refiner, keeping the energy. Many sharp distributions often average to a smooth one.
+    /// `offset` as in [`Known`](super::Known). Distributions with a weight that is zero or not finite are left out.
     #[must_use]
     pub fn average(distributions: &[(f32, &Self)], settings: &Refinement, offset: Rgb) -> Self {
         let some = distributions

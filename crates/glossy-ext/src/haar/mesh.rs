@@ -107,17 +107,21 @@ impl Mesh {
     }
 
     pub(super) fn corner_values(&self, tri: &Tri) -> [Rgb; 3] {
-        tri.corners.map(|v| self.values[usize::from(v)])
+        let [a, b, c] = tri.corners;
+        let at = |v: u16| self.values[usize::from(v)];
+        [at(a), at(b), at(c)]
     }
 
     /// Values at the midpoints of the edges, linear where there is no vertex.
     pub(super) fn mid_values(&self, tri: &Tri) -> [Rgb; 3] {
         let corners = self.corner_values(tri);
-        let between = midpoints(corners);
-        [0, 1, 2].map(|e| match tri.mids[e] {
-            NO_VERTEX => between[e],
-            v => self.values[usize::from(v)],
-        })
+        let mut mids = midpoints(corners);
+        for (value, &vertex) in std::iter::zip(&mut mids, &tri.mids) {
+            if vertex != NO_VERTEX {
+                *value = self.values[usize::from(vertex)];
+            }
+        }
+        mids
     }
 
     /// Divides a triangle in four, coarser neighbours first. New vertices take the value that `value` gives them.
@@ -250,9 +254,9 @@ impl Mesh {
 
     /// Mean of the interpolation over an undivided triangle (with respect to area on the octahedron).
     pub(super) fn mean(&self, tri: &Tri) -> Rgb {
-        let corners: Rgb = self.corner_values(tri).iter().sum();
-        let mids: Rgb = self.mid_values(tri).iter().sum();
-        (corners + 3.0 * mids) / 12.0
+        let [a, b, c] = self.corner_values(tri);
+        let [d, e, f] = self.mid_values(tri);
+        (a + b + c + 3.0 * (d + e + f)) / 12.0
     }
 
     /// Packs the mesh. Values that are not finite become 0; a mesh of zeros becomes the empty distribution.

@@ -6,7 +6,6 @@ use super::{Haar, MAX_LEVEL, MAX_UNIFORM_LEVEL};
 use crate::Rgb;
 use glam::Vec3;
 use hr_diffuse::Cone;
-use smallvec::SmallVec;
 
 /// When a triangle is subdivided.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,9 +170,8 @@ struct Sampler<'a, F> {
 }
 
 impl<F: FnMut(Vec3) -> Rgb> Sampler<'_, F> {
-    fn is_inside(&self, direction: Vec3) -> bool {
-        self.support
-            .is_none_or(|s| s.cone.axis.dot(direction) >= s.cone.cos_angle)
+    fn is_inside(&self, position: Vec3) -> bool {
+        self.support.is_none_or(|s| contains(&s.cone, position))
     }
 
     /// The value for any position on the octahedron or direction.
@@ -194,6 +192,11 @@ impl<F: FnMut(Vec3) -> Rgb> Sampler<'_, F> {
         self.largest = self.largest.max(value.abs().max_element());
         value
     }
+}
+
+/// Whether a direction of any length is in a cone.
+fn contains(cone: &Cone, direction: Vec3) -> bool {
+    cone.axis.dot(direction) >= cone.cos_angle * direction.length()
 }
 
 /// The direction of a cone's border nearest to one outside.
@@ -331,33 +334,31 @@ fn variation(
     center: Rgb,
 ) -> Variation {
     let corners = mesh.corner_values(tri);
-    let inside = triangle.corners.map(|p| sampler.is_inside(p.normalize()));
-    let all_inside = inside == [true; 3];
-    let mut samples = std::iter::zip(inside, corners)
-        .filter(|s| s.0)
-        .map(|s| s.1)
-        .collect::<SmallVec<[Rgb; 7]>>();
-    if sampler.is_inside(triangle.center()) {
-        samples.push(center);
-    }
-    let mut deviation = center - corners.iter().sum::<Rgb>() / 3.0;
-    if all_inside {
-        let between = midpoints(corners);
-        for edge in (0..3).filter(|&e| tri.mids[e] != NO_VERTEX) {
-            let mid = mesh.values[usize::from(tri.mids[edge])];
-            samples.push(mid);
-            deviation = deviation.abs().max((mid - between[edge]).abs());
+    let mut range: Option<(Rgb, Rgb)> = None;
+    let mut extend =
+        |v: Rgb| range = Some(range.map_or((v, v), |(low, high)| (low.min(v), high.max(v))));
+    let mut all_inside = true;
+    for (position, value) in std::iter::zip(triangle.corners, corners) {
+        if sampler.is_inside(position) {
+            extend(value);
+        } else {
+            all_inside = false;
         }
     }
-    let Some(&first) = samples.first() else {
-        return Variation::default();
-    };
-    let (low, high) = samples
-        .iter()
-        .fold((first, first), |(low, high), v| (low.min(*v), high.max(*v)));
+    if sampler.is_inside(triangle.center()) {
+        extend(center);
+    }
+    let mut deviation = (center - (corners[0] + corners[1] + corners[2]) / 3.0).abs();
+    if all_inside && tri.mids != [NO_VERTEX; 3] {
+        for (mid, between) in std::iter::zip(mesh.mid_values(tri), midpoints(corners)) {
+            extend(mid);
+            deviation = deviation.max((mid - between).abs());
+        }
+    }
+    let (low, high) = range.unwrap_or_default();
     // Across the border the interpolation is unknown. A parabola deviates from its chord by a quarter of its range.
     let deviation = if all_inside {
-        deviation.abs()
+        deviation
     } else {
         (high - low) * 0.25
     };
@@ -385,8 +386,7 @@ fn inherit(mesh: &Mesh, findings: &mut Vec<Finding>) {
 /// mean is that of the interpolation plus 3/4 of what it lacks in the middle. The same holds for a triangle with
 /// some midpoints on its edges, each of which takes 3/4 of its edge's share from both.
 fn keep_means(mesh: &mut Mesh, findings: &[Finding], support: Option<&Support>) {
-    let outside =
-        |p: Vec3| support.is_some_and(|s| s.cone.axis.dot(p.normalize()) < s.cone.cos_angle);
+    let outside = |p: Vec3| support.is_some_and(|s| !contains(&s.cone, p));
     let means: Vec<Option<Rgb>> = std::iter::zip(&mesh.tris, findings)
         .map(|(tri, finding)| {
             // The mean of a triangle that the border cuts is not known from its samples.

@@ -28,7 +28,8 @@ pub(super) fn child_corners<T: Copy>(corners: [T; 3], mids: [T; 3], child: usize
 /// Midpoints of the edges opposite each corner.
 #[inline]
 pub(super) fn midpoints(corners: [Vec3; 3]) -> [Vec3; 3] {
-    EDGE_ENDS.map(|[a, b]| 0.5 * corners[a] + 0.5 * corners[b])
+    let [a, b, c] = [0.5 * corners[0], 0.5 * corners[1], 0.5 * corners[2]];
+    [b + c, c + a, a + b]
 }
 
 /// Face of the octahedron by its signs (bit 0: x < 0, bit 1: y < 0, bit 2: z < 0) → its corners.
@@ -59,6 +60,17 @@ impl ConeTest {
     }
 }
 
+/// How a triangle lies to a cone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Overlap {
+    /// No direction in common.
+    Apart,
+    /// Perhaps some.
+    Partial,
+    /// The whole triangle is in the cone.
+    Inside,
+}
+
 /// A triangle on the octahedron's surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Triangle {
@@ -66,67 +78,83 @@ pub(super) struct Triangle {
     pub(super) corners: [Vec3; 3],
     /// Unit direction through the centroid.
     center: Vec3,
-    /// Cosine and sine of the angle from there to the farthest corner.
-    cos: f32,
-    sin: f32,
 }
 
 impl Triangle {
+    #[inline]
     pub(super) fn new(corners: [Vec3; 3]) -> Self {
-        let center = (corners[0] + corners[1] + corners[2]).normalize();
-        let cos = corners
-            .iter()
-            .map(|c| center.dot(*c) / c.length())
-            .fold(1.0, f32::min);
         Self {
             corners,
-            center,
-            cos,
-            sin: (1.0 - cos * cos).max(0.0).sqrt(),
+            center: (corners[0] + corners[1] + corners[2]).normalize(),
         }
     }
 
+    #[inline]
     pub(super) fn child(&self, child: usize) -> Self {
         Self::new(child_corners(self.corners, midpoints(self.corners), child))
     }
 
+    #[inline]
     pub(super) fn center(&self) -> Vec3 {
         self.center
     }
 
     /// Cosine of the angle from the middle to the farthest corner.
+    #[inline]
     pub(super) fn cos_radius(&self) -> f32 {
-        self.cos
+        let cos = |c: Vec3| self.center.dot(c) / c.length();
+        cos(self.corners[0])
+            .min(cos(self.corners[1]))
+            .min(cos(self.corners[2]))
+            .min(1.0)
     }
 
     /// Whether a cone and this triangle may have a direction in common. Never wrongly false.
     pub(super) fn touches(&self, cone: &ConeTest) -> bool {
-        // Around the triangle: angle(axis, center) ≤ cone's angle + radius, without leaving cosines.
-        if cone.cos <= -self.cos {
-            return true;
-        }
-        if self.center.dot(cone.axis) < cone.cos * self.cos - cone.sin * self.sin - ConeTest::SLACK
+        self.overlap(cone) != Overlap::Apart
+    }
+
+    /// Never wrongly apart nor inside.
+    pub(super) fn overlap(&self, cone: &ConeTest) -> Overlap {
+        let between = self.center.dot(cone.axis);
+        let cos = self.cos_radius();
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        // Inside: angle(axis, center) ≤ cone's angle − radius, in cosines.
+        if cone.cos < cos - ConeTest::SLACK
+            && between > cone.cos * cos + cone.sin * sin + ConeTest::SLACK
         {
-            return false;
+            return Overlap::Inside;
+        }
+        // Touching the circle around the triangle: angle(axis, center) ≤ cone's angle + radius.
+        if cone.cos <= -cos {
+            return Overlap::Partial;
+        }
+        if between < cone.cos * cos - cone.sin * sin - ConeTest::SLACK {
+            return Overlap::Apart;
         }
         // The edges' great circles; a cone wider than a hemisphere reaches across every one.
         if cone.cos <= 0.0 {
-            return true;
+            return Overlap::Partial;
         }
-        EDGE_ENDS.iter().all(|&[a, b]| {
+        let reaches = |&[a, b]: &[usize; 2]| {
             let normal = self.corners[a].cross(self.corners[b]);
-            let (inward, size) = if normal.dot(self.center) < 0.0 {
-                (-normal, normal.length())
+            let inward = if normal.dot(self.center) < 0.0 {
+                -normal
             } else {
-                (normal, normal.length())
+                normal
             };
-            inward.dot(cone.axis) >= -cone.sin * size - ConeTest::SLACK
-        })
+            inward.dot(cone.axis) >= -cone.sin * normal.length() - ConeTest::SLACK
+        };
+        if EDGE_ENDS.iter().all(reaches) {
+            Overlap::Partial
+        } else {
+            Overlap::Apart
+        }
     }
 
-    /// ∫ weight(direction) · (linear interpolation of `values`) dω over the triangle by quadrature of degree 5 on
-    /// each of 4^`splits` parts (Radon's seven points), and ∫ weight dω. The solid angle of an area dA of a face, at
-    /// distance 1/√3 from the origin, is dω = dA / (√3 |p|³).
+    /// ∫ weight(direction) · (linear interpolation of `values`) dω over the triangle and ∫ weight dω, by quadrature
+    /// on each of 4^`splits` parts: Radon's seven points, fewer for small triangles. The solid angle of an area dA
+    /// of a face, at distance 1/√3 from the origin, is dω = dA / (√3 |p|³).
     pub(super) fn integrate(
         &self,
         values: [DVec3; 3],
@@ -145,7 +173,13 @@ impl Triangle {
         let [a, b, c] = self.corners;
         let area = 0.5 * f64::from((b - a).cross(c - a).length());
         let (mut sum, mut total) = (DVec3::ZERO, 0.0);
-        for (l, w) in RADON {
+        // Small triangles take the three midpoints of their edges, degree 2.
+        let rule: &[_] = if self.cos_radius() > 0.998 {
+            &MIDPOINTS
+        } else {
+            &RADON
+        };
+        for &(l, w) in rule {
             let p = a * l[0] as f32 + b * l[1] as f32 + c * l[2] as f32;
             let length = p.length();
             let jacobian = area * w / (3.0_f64.sqrt() * f64::from(length * length * length));
@@ -163,6 +197,13 @@ impl Triangle {
         0.5 * (b - a).cross(c - a).length() / (3.0_f32.sqrt() * p.length().powi(3))
     }
 }
+
+/// The rule of degree 2 on a triangle: barycentric coordinates and weights.
+const MIDPOINTS: [([f64; 3], f64); 3] = [
+    ([0.0, 0.5, 0.5], 1.0 / 3.0),
+    ([0.5, 0.0, 0.5], 1.0 / 3.0),
+    ([0.5, 0.5, 0.0], 1.0 / 3.0),
+];
 
 /// Radon's rule of degree 5 on a triangle: barycentric coordinates and weights.
 const RADON: [([f64; 3], f64); 7] = {

@@ -15,6 +15,10 @@ const THIN: f64 = 1e-12;
 /// where edges meet.
 const EDGE_TOLERANCE: f32 = 4.0 * f32::EPSILON;
 
+/// A ray whose direction has less than this cosine with the normal runs within the plane and does not hit: its edge
+/// functions are but the rounding of positions.
+const IN_PLANE: f32 = 1e-6;
+
 /// A triangle in unit space; P(u, v) = p₀(1−u−v) + p₁u + p₂v.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Triangle {
@@ -202,9 +206,11 @@ impl Outline {
         if volumes.min_element() < -tolerance && volumes.max_element() > tolerance {
             return None;
         }
-        let corner = Vec3::new(x.x, y.x, z.x);
-        // Zero over zero, or a zero divisor, fails both comparisons or the finite limits.
-        let t = corner.dot(self.normal) / direction.dot(self.normal);
+        let along = direction.dot(self.normal);
+        if along.abs() <= IN_PLANE * direction.abs().max_element() {
+            return None;
+        }
+        let t = Vec3::new(x.x, y.x, z.x).dot(self.normal) / along;
         (t > t_min && t < t_max).then_some(t)
     }
 }

@@ -13,8 +13,8 @@ use std::f32::consts::TAU;
 /// What rounding may do to the cosine between a normal computed in f32 and the axis of a cone.
 const COSINE_SLACK: f32 = 1e-6;
 
-/// Hits this far beyond the end of a profile (unit space) still count, so that no ray slips through where two
-/// surfaces abut: the rounding of positions to f32.
+/// Hits this far (unit space, along the profile) beyond the end of a profile still count, so that no ray slips
+/// through where two surfaces abut: the rounding of positions to f32.
 const RIM: f64 = 2e-7;
 
 /// A profile curve (ρ, h), v running 0…1: distance from the axis and height along it, in unit space.
@@ -500,10 +500,11 @@ fn line_hits(from: DVec2, to: DVec2, o: DVec3, d: DVec3) -> SmallVec<[f64; 8]> {
     let b = h * h * p.truncate().dot(d.truncate()) - slope * g;
     let c = h * h * p.truncate().length_squared() - g * g;
     let mut hits = quadratic(a, b, c);
+    let rim = RIM * h / along.length();
     hits.retain(|t| {
         let z = p.z + d.z * *t - from.y;
         // A little beyond the rim counts; the other nappe of the cone does not.
-        z >= -RIM && z <= h + RIM && from.x + along.x * (z / h) >= -RIM
+        z >= -rim && z <= h + rim && from.x + along.x * (z / h) >= -RIM
     });
     hits.iter_mut().for_each(|t| *t += shift);
     hits

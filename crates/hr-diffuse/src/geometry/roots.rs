@@ -11,7 +11,7 @@ fn value(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
-/// Real roots of Σ cᵢ xⁱ (order at most 4) in `low`…`high`, ascending. Between two neighbouring roots of the derivative a
+/// Real roots of Σ cᵢ xⁱ (order at most 4) in `low`…`high`, ascending. Between neighbouring roots of its derivative a
 /// polynomial is monotone, so every root where it changes sign is bracketed; one where it only touches zero may be
 /// missed.
 pub(super) fn roots_between(coefficients: &[f64], low: f64, high: f64) -> SmallVec<[f64; 8]> {

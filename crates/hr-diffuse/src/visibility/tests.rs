@@ -73,7 +73,8 @@ proptest! {
     fn short_and_long_segments_meet_a_wall_between_them(
         length in -4.0f32..0.5, share in 0.1f32..0.9, tilt in -1f32..1.0,
     ) {
-        let wall = scene([Shape::Quad([dvec3(0.5, 0.0, 0.0), dvec3(0.5, 1.0, 0.0), dvec3(0.5, 1.0, 1.0), dvec3(0.5, 0.0, 1.0)])]);
+        let wall = [dvec3(0.5, 0.0, 0.0), dvec3(0.5, 1.0, 0.0), dvec3(0.5, 1.0, 1.0), dvec3(0.5, 0.0, 1.0)];
+        let wall = scene([Shape::Quad(wall)]);
         let step = vec3(1.0, tilt, 0.2).normalize() * 10f32.powf(length) * 0.3;
         let middle = vec3(0.5, 0.5, 0.5);
         prop_assert!(blocked(&wall, middle - step * share, middle + step * (1.0 - share)), "step {step}");
@@ -254,5 +255,21 @@ fn hits_locate_the_part() {
         let target = surface.point(child.lerp(0.4, 0.6));
         let hit = visibility.closest(target + vec3(0.1, 0.2, 0.5), vec3(-0.1, -0.2, -0.5), 0.0, 2.0).expect("hit");
         assert_eq!(surface.locate(&children, hit.uv), i, "part {i} at {}", hit.uv);
+    }
+}
+
+#[test]
+fn walls_do_not_leak_from_afar() {
+    // From afar the boxes' near and far distances differ by little more than their rounding.
+    let visibility = scene(wall(24, 0.3, |a, b| dvec3(0.5, a, b)));
+    for i in 0..4000u32 {
+        let share = |k: u32| (i.wrapping_mul(k) % 4001) as f32 / 4001.0;
+        let target = vec3(0.5, 0.01 + 0.98 * share(577), 0.01 + 0.98 * share(1423));
+        for distance in [3.0, 40.0, 500.0] {
+            let eye = vec3(0.5, 0.5, 0.5) + vec3(1.0, share(31) - 0.5, 0.5 - share(97)) * distance;
+            let hit = visibility.closest(eye, target - eye, 0.0, 2.0);
+            assert!(hit.is_some(), "from {eye} at {target}");
+            assert!(blocked(&visibility, eye, 2.0 * target - eye), "from {eye} through {target}");
+        }
     }
 }

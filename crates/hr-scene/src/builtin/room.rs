@@ -71,7 +71,7 @@ impl Palette {
             teal_wall: solid("teal wall", cloth(0.17, 0.40, 0.42)),
             ceiling: solid("ceiling", cloth(0.80, 0.80, 0.78)),
             white_paint: solid("white paint", varnish(0.72, 0.71, 0.68, 0.04, 0.10)),
-            sky: solid("sky", Paint::light(rgb(0.72, 0.92, 1.25) * 320.0)),
+            sky: solid("sky", Paint::light(rgb(0.72, 0.92, 1.25) * 240.0)),
             bulb: solid("bulb", Paint::light(rgb(1.30, 0.95, 0.60) * 22_000.0)),
             globe: solid("opal globe", Paint::light(rgb(1.25, 0.96, 0.66) * 2_200.0)),
             panel: solid("ceiling lamp", Paint::light(rgb(1.20, 0.98, 0.74) * 1_800.0)),
@@ -127,8 +127,8 @@ pub(super) fn room() -> Scene {
     plant(&mut b, &p, dvec3(2.66, 4.08, 0.0));
     ceiling_lamp(&mut b, &p, dvec2(3.3, 1.7));
     let camera = |eye, target, fov_x| Camera { eye, target, up: [0.0, 0.0, 1.0], fov_x, width: 640, height: 400 };
-    b.camera("main", camera([0.36, 0.42, 1.50], [3.45, 3.10, 0.78], 72.0));
-    b.camera("dining", camera([4.35, 0.75, 1.35], [1.30, 3.30, 0.80], 66.0));
+    b.camera("main", camera([0.36, 0.62, 1.50], [3.40, 3.15, 0.80], 72.0));
+    b.camera("dining", camera([4.40, 0.95, 1.35], [1.55, 3.30, 0.82], 66.0));
     b.camera("window", camera([4.35, 3.85, 1.45], [0.95, 1.25, 0.78], 74.0));
     b.done()
 }
@@ -221,9 +221,8 @@ fn dining_corner(b: &mut Builder, p: &Palette) {
     );
     let on_table = |radius: f64, angle: f64| center + dvec3(radius * angle.cos(), radius * angle.sin(), top);
     fruit_bowl(b, p, on_table(0.0, 0.0));
-    for k in 0..4 {
-        let angle = (20.0 + 90.0 * f64::from(k)).to_radians();
-        let plate = [(0.07, 0.0), (0.115, 0.012), (0.115, 0.016), (0.07, 0.004), (0.0, 0.004)];
+    for angle in [-52.0_f64, 25.0, 165.0].map(f64::to_radians) {
+        let plate = [(0.07, 0.0), (0.115, 0.014), (0.07, 0.004), (0.0, 0.004)];
         b.lathe(p.porcelain, on_table(0.41, angle), DVec3::Z, &plate);
         let place = center + 0.80 * dvec3(angle.cos(), angle.sin(), 0.0);
         b.frame = DAffine3::from_translation(place) * DAffine3::from_rotation_z(angle + PI);
@@ -237,7 +236,7 @@ fn dining_corner(b: &mut Builder, p: &Palette) {
         b.block(p.walnut, [0.55, 4.27, z - 0.03], [2.25, SIZE.y, z], skip::Y1);
     }
     let lower = |x: f64| dvec3(x, 4.38, 1.34);
-    books(b, p, dvec3(0.62, 4.30, 1.34), 5, 0);
+    books(b, p, dvec3(0.62, 4.30, 1.34), 4, 0);
     b.sphere(p.chrome, lower(1.02) + DVec3::Z * 0.075, 0.075);
     vase(b, p.green_glaze, lower(1.30), 0.20);
     let ring = 0.075;
@@ -248,7 +247,7 @@ fn dining_corner(b: &mut Builder, p: &Palette) {
     b.sphere(p.copper, upper(0.72) + DVec3::Z * 0.08, 0.08);
     b.torus(p.chrome, upper(0.98) + DVec3::Z * 0.022, DVec3::Z, 0.07, 0.022);
     vase(b, p.porcelain, upper(1.30), 0.26);
-    books(b, p, dvec3(1.55, 4.30, 1.76), 4, 2);
+    books(b, p, dvec3(1.58, 4.30, 1.76), 3, 2);
     bowl(b, p.blue_glaze, upper(1.98));
 }
 
@@ -258,7 +257,7 @@ fn chair(b: &mut Builder, p: &Palette) {
     b.block(paint, [-0.20, -0.21, seat - 0.03], [0.21, 0.21, seat], skip::NONE);
     for y in [-0.175, 0.175] {
         for x in [-0.17, 0.17] {
-            b.rod(paint, [dvec3(1.1 * x, 1.1 * y, 0.0), dvec3(x, y, seat - 0.03)], [0.011, 0.018]);
+            b.rod(paint, [dvec3(1.1 * x, 1.1 * y, 0.0), dvec3(x, y, seat - 0.02)], [0.011, 0.018]);
         }
         b.lathe(paint, dvec3(-0.175, y, seat), DVec3::Z, &[(0.014, 0.0), (0.012, 0.44), (0.0, 0.44)]);
     }
@@ -283,19 +282,10 @@ fn fruit_bowl(b: &mut Builder, p: &Palette, base: DVec3) {
 
 /// A bowl of 28 cm.
 fn bowl(b: &mut Builder, material: u32, base: DVec3) {
-    let profile = [
-        (0.0, 0.0),
-        (0.05, 0.0),
-        (0.055, 0.01),
-        (0.11, 0.05),
-        (0.14, 0.092),
-        (0.135, 0.092),
-        (0.105, 0.054),
-        (0.05, 0.016),
-        (0.0, 0.014),
-    ];
+    let profile =
+        [(0.05, 0.0), (0.11, 0.046), (0.14, 0.092), (0.135, 0.092), (0.105, 0.054), (0.05, 0.016), (0.0, 0.014)];
     // It stands on its foot: the underside is not there.
-    b.lathe(material, base, DVec3::Z, &profile[1..]);
+    b.lathe(material, base, DVec3::Z, &profile);
 }
 
 /// A bellied vase, open at the top.
@@ -305,15 +295,11 @@ fn vase(b: &mut Builder, material: u32, base: DVec3, height: f64) {
         (0.34, 0.20),
         (0.36, 0.40),
         (0.26, 0.64),
-        (0.14, 0.80),
-        (0.13, 0.88),
+        (0.13, 0.84),
         (0.20, 1.0),
         (0.18, 1.0),
-        (0.11, 0.88),
-        (0.12, 0.80),
-        (0.23, 0.64),
-        (0.32, 0.40),
-        (0.0, 0.10),
+        (0.11, 0.84),
+        (0.0, 0.60),
     ];
     b.lathe(material, base, DVec3::Z, &profile.map(|(r, z)| (r * height, z * height)));
 }
@@ -390,7 +376,7 @@ fn sofa(b: &mut Builder, p: &Palette) {
         b.lathe(p.sofa, dvec3(-0.01, 0.90 * side, 0.56), DVec3::X, &arm);
         let (y0, y1): (f64, f64) = (0.005 * side, 0.785 * side);
         let (low, high) = (y0.min(y1), y0.max(y1));
-        b.block(p.cushion, [0.23, low, 0.30], [0.94, high, 0.45], skip::Z0);
+        b.block(p.cushion, [0.23, low, 0.30], [0.895, high, 0.45], skip::Z0);
         b.block(p.cushion, [0.23, low + 0.01, 0.45], [0.37, high - 0.01, 0.80], skip::Z0);
         let roll = [(0.0, 0.0), (0.085, 0.0), (0.085, 0.44), (0.0, 0.44)];
         b.lathe(p.bolster, dvec3(0.46, 0.5 * side - 0.22, 0.535), DVec3::Y, &roll);
@@ -407,7 +393,11 @@ fn coffee_table(b: &mut Builder, p: &Palette, base: DVec3) {
     for k in 0..3 {
         let a = 0.4 + TAU * f64::from(k) / 3.0;
         let out = dvec3(a.cos(), a.sin(), 0.0);
-        b.rod(p.brass, [base + 0.34 * out, base + 0.26 * out + DVec3::Z * (top - 2.0 * rim)], [0.010, 0.018]);
+        b.rod(
+            p.brass,
+            [base + 0.34 * out - DVec3::Z * (0.3 * RUG_HEIGHT), base + 0.26 * out + DVec3::Z * (top - rim)],
+            [0.010, 0.018],
+        );
     }
     let on_top = |x: f64, y: f64| base + dvec3(x, y, top);
     vase(b, p.porcelain, on_top(0.14, 0.16), 0.22);
@@ -521,11 +511,11 @@ fn bookcase(b: &mut Builder, p: &Palette) {
     let back = skip::X0 | skip::X1 | ends;
     b.block(p.oak, [x0 + t, y0, 0.06 + t], [x1 - t, y0 + 0.008, 0.48], back);
     b.block(p.oak, [x0 + t, y0, 0.48 + t], [x1 - t, y0 + 0.008, top], back);
-    books(b, p, dvec3(1.58, 0.10, 0.48 + t), 6, 1);
+    books(b, p, dvec3(1.58, 0.10, 0.48 + t), 5, 1);
     b.sphere(p.blue_glaze, dvec3(2.10, 0.18, 0.48 + t + 0.09), 0.09);
     vase(b, p.porcelain, dvec3(2.45, 0.18, 0.48 + t), 0.24);
     bowl(b, p.green_glaze, dvec3(1.95, 0.18, 0.06 + t));
-    books(b, p, dvec3(2.45, 0.10, 0.06 + t), 5, 3);
+    books(b, p, dvec3(2.55, 0.10, 0.06 + t), 3, 3);
     b.lathe(p.copper, dvec3(2.75, 0.17, top + t), DVec3::Z, &[(0.09, 0.0), (0.0, 0.30)]);
     b.torus(p.chrome, dvec3(2.40, 0.17, top + t + 0.03), DVec3::Z, 0.09, 0.03);
 }
@@ -538,8 +528,8 @@ fn plant(b: &mut Builder, p: &Palette, base: DVec3) {
     b.lathe(p.soil, soil, DVec3::Z, &[(0.16, 0.0), (0.0, 0.0)]);
     // Leaves follow each other by the golden angle.
     let golden = PI * (3.0 - 5.0_f64.sqrt());
-    for k in 0..12 {
-        let t = f64::from(k) / 11.0;
+    for k in 0..10 {
+        let t = f64::from(k) / 9.0;
         let a = golden * f64::from(k) + 0.6;
         let out = dvec3(a.cos(), a.sin(), 0.0);
         let side = dvec3(-a.sin(), a.cos(), 0.0);

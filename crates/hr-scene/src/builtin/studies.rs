@@ -89,7 +89,7 @@ pub(super) fn glossy_sphere() -> Scene {
 pub(super) fn empty_room() -> Scene {
     let mut b = Builder::new("empty-room");
     // CIE xy (.4051, .3621), Y .2811.
-    let tile = Rgb::new(0.406_729_22, 0.242_582_3, 0.165_429_97);
+    let tile = Rgb::new(0.406_729_22, 0.242_582_25, 0.165_429_97);
     let floor = b.material("floor_tile", Paint::glossy(tile, Rgb::splat(0.3), 0.07));
     let wall = b.material("wallpaint", Paint::diffuse(Rgb::splat(0.6)));
     let lamp = b.material("lamp", Paint::light(Rgb::splat(626.5)));

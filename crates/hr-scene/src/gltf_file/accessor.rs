@@ -11,11 +11,7 @@ const MAX_ZEROS: u64 = 1 << 24;
 
 impl Document {
     /// An accessor of `N`-vectors (or scalars) of any component type; normalised integers are mapped to −1…1 or 0…1.
-    pub(super) fn vectors<const N: usize>(
-        &self,
-        index: usize,
-        place: &str,
-    ) -> Result<Vec<[f32; N]>, SceneError> {
+    pub(super) fn vectors<const N: usize>(&self, index: usize, place: &str) -> Result<Vec<[f32; N]>, SceneError> {
         let accessor = &self.root.accessors[index];
         let normalized = accessor.normalized;
         self.elements(index, place, [0.0; N], |bytes, component| {
@@ -28,20 +24,11 @@ impl Document {
     pub(super) fn indices(&self, index: usize, place: &str) -> Result<Vec<u32>, SceneError> {
         let component = self.root.accessors[index].component_type;
         if let Checked::Valid(c) = component
-            && !matches!(
-                c.0,
-                ComponentType::U8 | ComponentType::U16 | ComponentType::U32
-            )
+            && !matches!(c.0, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
         {
-            return Err(self.wrong(
-                place,
-                "the component type is no unsigned integer",
-                "5121, 5123 or 5125 would be",
-            ));
+            return Err(self.wrong(place, "the component type is no unsigned integer", "5121, 5123 or 5125 would be"));
         }
-        let values = self.elements(index, place, [0_u32; 1], |bytes, component| {
-            [unsigned(bytes, component)]
-        })?;
+        let values = self.elements(index, place, [0_u32; 1], |bytes, component| [unsigned(bytes, component)])?;
         Ok(values.into_iter().map(|[i]| i).collect())
     }
 
@@ -61,23 +48,14 @@ impl Document {
         read: impl Fn(&[u8], ComponentType) -> [T; N],
     ) -> Result<Vec<[T; N]>, SceneError> {
         let accessor = &self.root.accessors[index];
-        let (Checked::Valid(component), Checked::Valid(kind)) =
-            (accessor.component_type, accessor.type_)
-        else {
-            return Err(self.wrong(
-                place,
-                "the accessor's type is unknown",
-                "see the glTF 2.0 specification",
-            ));
+        let (Checked::Valid(component), Checked::Valid(kind)) = (accessor.component_type, accessor.type_) else {
+            return Err(self.wrong(place, "the accessor's type is unknown", "see the glTF 2.0 specification"));
         };
         let is_matrix = matches!(kind, Type::Mat2 | Type::Mat3 | Type::Mat4);
         if kind.multiplicity() != N || is_matrix {
             return Err(self.wrong(
                 place,
-                format!(
-                    "accessors[{index}] has {} components per element",
-                    kind.multiplicity()
-                ),
+                format!("accessors[{index}] has {} components per element", kind.multiplicity()),
                 format!("{N} would be right"),
             ));
         }
@@ -101,24 +79,13 @@ impl Document {
         };
         if let Some(sparse) = &accessor.sparse {
             let Checked::Valid(index_type) = sparse.indices.component_type else {
-                return Err(self.wrong(
-                    place,
-                    "the type of the sparse indices is unknown",
-                    "5125 would be right",
-                ));
+                return Err(self.wrong(place, "the type of the sparse indices is unknown", "5125 would be right"));
             };
             let (index_type, n) = (index_type.0, sparse.count.0);
             let at = &sparse.indices;
-            let targets = self.slots(
-                at.buffer_view.value(),
-                at.byte_offset.0,
-                n,
-                index_type.size(),
-                place,
-            )?;
+            let targets = self.slots(at.buffer_view.value(), at.byte_offset.0, n, index_type.size(), place)?;
             let from = &sparse.values;
-            let sources =
-                self.slots(from.buffer_view.value(), from.byte_offset.0, n, size, place)?;
+            let sources = self.slots(from.buffer_view.value(), from.byte_offset.0, n, size, place)?;
             for (target, source) in targets.zip(sources) {
                 let target = unsigned(target, index_type);
                 let slot = values.get_mut(target as usize).ok_or_else(|| {
@@ -144,14 +111,9 @@ impl Document {
         place: &str,
     ) -> Result<impl Iterator<Item = &[u8]>, SceneError> {
         let bytes = self.view(view, place)?;
-        let stride = self.root.buffer_views[view]
-            .byte_stride
-            .map_or(size, |s| s.0);
-        let end = (count.checked_sub(1)).map_or(Some(0), |last| {
-            last.checked_mul(stride as u64)?
-                .checked_add(size as u64)?
-                .checked_add(offset)
-        });
+        let stride = self.root.buffer_views[view].byte_stride.map_or(size, |s| s.0);
+        let end = (count.checked_sub(1))
+            .map_or(Some(0), |last| last.checked_mul(stride as u64)?.checked_add(size as u64)?.checked_add(offset));
         if stride < size || end.is_none_or(|end| end > bytes.len() as u64) {
             return Err(self.wrong(
                 place,
@@ -181,11 +143,7 @@ fn unsigned(bytes: &[u8], component: ComponentType) -> u32 {
 /// One component as a number; normalised integers by the glTF 2.0 specification, section 3.6.2.2.
 fn number(bytes: &[u8], component: ComponentType, normalized: bool) -> f32 {
     let scaled = |value: f32, largest: f32| {
-        if normalized {
-            (value / largest).max(-1.0)
-        } else {
-            value
-        }
+        if normalized { (value / largest).max(-1.0) } else { value }
     };
     match component {
         ComponentType::I8 => scaled(f32::from(bytes[0] as i8), 127.0),

@@ -6,12 +6,8 @@ use gltf::json::{self, Root};
 use std::path::{Path, PathBuf};
 
 /// Extensions that are understood.
-const SUPPORTED: [&str; 4] = [
-    "KHR_lights_punctual",
-    "KHR_materials_emissive_strength",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-];
+const SUPPORTED: [&str; 4] =
+    ["KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_mesh_quantization", "KHR_texture_transform"];
 
 /// A document whose indices all lie in range, and its buffers.
 pub(super) struct Document {
@@ -19,6 +15,9 @@ pub(super) struct Document {
     pub(super) buffers: Vec<Vec<u8>>,
     path: PathBuf,
 }
+
+/// JSON text and binary chunk.
+type Chunks<'a> = (std::borrow::Cow<'a, [u8]>, Option<Vec<u8>>);
 
 /// The part of a document that is looked at before the rest is expected to make sense.
 #[derive(serde::Deserialize)]
@@ -30,11 +29,7 @@ struct Preamble {
 impl Document {
     /// Parses and checks a .gltf or .glb file that lies at `path`, and reads its buffers.
     pub(super) fn new(bytes: &[u8], path: &Path) -> Result<Self, SceneError> {
-        let mut this = Self {
-            root: Root::default(),
-            buffers: Vec::new(),
-            path: path.to_owned(),
-        };
+        let mut this = Self { root: Root::default(), buffers: Vec::new(), path: path.to_owned() };
         let (text, mut blob) = this.split(bytes)?;
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
         let preamble: Preamble = serde_json::from_slice(text).map_err(|e| this.no_json(&e))?;
@@ -57,38 +52,22 @@ impl Document {
         Ok(this)
     }
 
-    /// JSON text and binary chunk.
-    fn split<'a>(
-        &self,
-        bytes: &'a [u8],
-    ) -> Result<(std::borrow::Cow<'a, [u8]>, Option<Vec<u8>>), SceneError> {
+    /// Takes a .glb container apart; anything else is all text.
+    fn split<'a>(&self, bytes: &'a [u8]) -> Result<Chunks<'a>, SceneError> {
         if !bytes.starts_with(b"glTF") {
             return Ok((bytes.into(), None));
         }
-        let length = bytes
-            .get(8..12)
-            .and_then(|b| b.try_into().ok())
-            .map_or(0, u32::from_le_bytes) as usize;
+        let length = bytes.get(8..12).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes) as usize;
         // Shorter than its own header, a length would make the parser below subtract past zero.
-        let content = bytes
-            .get(..length)
-            .filter(|_| length >= 12)
-            .ok_or_else(|| {
-                self.wrong(
-                    "header",
-                    format!(
-                        "it gives a length of {length} bytes but the file has {}",
-                        bytes.len()
-                    ),
-                    "copy or export the file anew, whole",
-                )
-            })?;
-        let glb = gltf::Glb::from_slice(content).map_err(|e| {
+        let content = bytes.get(..length).filter(|_| length >= 12).ok_or_else(|| {
             self.wrong(
                 "header",
-                format!("the binary container is damaged ({e})"),
-                "export the file anew as glTF 2.0",
+                format!("it gives a length of {length} bytes but the file has {}", bytes.len()),
+                "copy or export the file anew, whole",
             )
+        })?;
+        let glb = gltf::Glb::from_slice(content).map_err(|e| {
+            self.wrong("header", format!("the binary container is damaged ({e})"), "export the file anew as glTF 2.0")
         })?;
         Ok((glb.json, glb.bin.map(std::borrow::Cow::into_owned)))
     }
@@ -115,40 +94,29 @@ impl Document {
             }
         }
         let mut faults = Vec::new();
-        self.root
-            .validate(&self.root, json::Path::new, &mut |path, fault| {
-                let path = path().to_string();
-                let unused = path.ends_with("[\"POSITION\"]")
-                    || path.ends_with("[\"POSITION\"].min")
-                    || path.ends_with("[\"POSITION\"].max");
-                if !(unused && matches!(fault, Fault::Missing)) {
-                    faults.push((path, fault));
-                }
-            });
+        self.root.validate(&self.root, json::Path::new, &mut |path, fault| {
+            let path = path().to_string();
+            let unused = path.ends_with("[\"POSITION\"]")
+                || path.ends_with("[\"POSITION\"].min")
+                || path.ends_with("[\"POSITION\"].max");
+            if !(unused && matches!(fault, Fault::Missing)) {
+                faults.push((path, fault));
+            }
+        });
         let Some((path, fault)) = faults.first() else {
             return Ok(());
         };
         let (what, mend) = match fault {
-            Fault::IndexOutOfBounds => (
-                "the index is out of range",
-                "the index of a present item would be right",
-            ),
+            Fault::IndexOutOfBounds => ("the index is out of range", "the index of a present item would be right"),
             Fault::Missing => ("required data is missing", "add it or export the file anew"),
             Fault::Oversize => ("the number is too large", "export the file anew"),
-            _ => (
-                "the value is not one that glTF 2.0 allows",
-                "see the glTF 2.0 specification for what it does",
-            ),
+            _ => ("the value is not one that glTF 2.0 allows", "see the glTF 2.0 specification for what it does"),
         };
         let more = match faults.len() - 1 {
             0 => String::new(),
             n => format!(" ({n} more faults follow)"),
         };
-        Err(self.wrong(
-            &path.replace("[\"", ".").replace("\"]", ""),
-            format!("{what}{more}"),
-            mend,
-        ))
+        Err(self.wrong(&path.replace("[\"", ".").replace("\"]", ""), format!("{what}{more}"), mend))
     }
 
     fn buffer(&self, index: usize, blob: &mut Option<Vec<u8>>) -> Result<Vec<u8>, SceneError> {
@@ -157,21 +125,13 @@ impl Document {
         let data = match &buffer.uri {
             Some(uri) => self.read_uri(uri, &format!("{place}.uri"))?,
             None => blob.take().filter(|_| index == 0).ok_or_else(|| {
-                self.wrong(
-                    &place,
-                    "it has neither a uri nor the file's binary chunk",
-                    "give it a uri",
-                )
+                self.wrong(&place, "it has neither a uri nor the file's binary chunk", "give it a uri")
             })?,
         };
         if (data.len() as u64) < buffer.byte_length.0 {
             return Err(self.wrong(
                 &format!("{place}.byteLength"),
-                format!(
-                    "it says {} bytes but the data has only {}",
-                    buffer.byte_length.0,
-                    data.len()
-                ),
+                format!("it says {} bytes but the data has only {}", buffer.byte_length.0, data.len()),
                 "the data is cut off: copy or export the file anew, whole",
             ));
         }
@@ -183,21 +143,12 @@ impl Document {
         if uri.starts_with("data:") {
             let data = gltf::buffer::Data::from_source(gltf::buffer::Source::Uri(uri), None);
             return data.map(|data| data.0).map_err(|e| {
-                self.wrong(
-                    place,
-                    format!("the data URI cannot be decoded ({e})"),
-                    "base64 would be right",
-                )
+                self.wrong(place, format!("the data URI cannot be decoded ({e})"), "base64 would be right")
             });
         }
-        let relative = percent_decoded(uri)
-            .filter(|name| !name.contains(':') && !name.is_empty())
-            .ok_or_else(|| {
-                self.wrong(
-                    place,
-                    format!("'{uri}' is no relative file name"),
-                    "embed the data or lay the file beside",
-                )
+        let relative =
+            percent_decoded(uri).filter(|name| !name.contains(':') && !name.is_empty()).ok_or_else(|| {
+                self.wrong(place, format!("'{uri}' is no relative file name"), "embed the data or lay the file beside")
             })?;
         let path = self.path.parent().unwrap_or(Path::new("")).join(relative);
         std::fs::read(&path).map_err(|source| SceneError::Io { path, source })
@@ -208,9 +159,7 @@ impl Document {
         let view = &self.root.buffer_views[index];
         let offset = view.byte_offset.map_or(0, |o| o.0);
         let data = &self.buffers[view.buffer.value()];
-        let end = offset
-            .checked_add(view.byte_length.0)
-            .filter(|end| *end <= data.len() as u64);
+        let end = offset.checked_add(view.byte_length.0).filter(|end| *end <= data.len() as u64);
         end.map(|end| &data[offset as usize..end as usize]).ok_or_else(|| {
             self.wrong(
                 place,
@@ -227,25 +176,12 @@ impl Document {
 
     /// Names of extensions that the file uses, does not require, and that are not understood.
     pub(super) fn ignored_extensions(&self) -> impl Iterator<Item = &str> {
-        self.root
-            .extensions_used
-            .iter()
-            .map(String::as_str)
-            .filter(|name| !SUPPORTED.contains(name))
+        self.root.extensions_used.iter().map(String::as_str).filter(|name| !SUPPORTED.contains(name))
     }
 
     /// An error at a JSON path.
-    pub(super) fn wrong(
-        &self,
-        place: &str,
-        what: impl Into<String>,
-        mend: impl Into<String>,
-    ) -> SceneError {
-        SceneError::Syntax {
-            place: format!("{}: {place}", self.path.display()),
-            what: what.into(),
-            mend: mend.into(),
-        }
+    pub(super) fn wrong(&self, place: &str, what: impl Into<String>, mend: impl Into<String>) -> SceneError {
+        SceneError::Syntax { place: format!("{}: {place}", self.path.display()), what: what.into(), mend: mend.into() }
     }
 
     fn no_json(&self, error: &serde_json::Error) -> SceneError {
@@ -266,10 +202,7 @@ fn mend_extension(name: &str) -> String {
             "export its textures as PNG or JPEG".to_owned()
         }
         "EXT_mesh_gpu_instancing" => "export each instance as a node".to_owned(),
-        _ => format!(
-            "export the file without {name}; supported: {}",
-            SUPPORTED.join(", ")
-        ),
+        _ => format!("export the file without {name}; supported: {}", SUPPORTED.join(", ")),
     }
 }
 
@@ -279,9 +212,7 @@ fn percent_decoded(uri: &str) -> Option<String> {
     let mut rest = uri.as_bytes();
     while let Some((&first, tail)) = rest.split_first() {
         let hex = (first == b'%').then(|| tail.get(..2)).flatten();
-        let code = hex
-            .and_then(|h| std::str::from_utf8(h).ok())
-            .and_then(|h| u8::from_str_radix(h, 16).ok());
+        let code = hex.and_then(|h| std::str::from_utf8(h).ok()).and_then(|h| u8::from_str_radix(h, 16).ok());
         bytes.push(code.unwrap_or(first));
         rest = if code.is_some() { &tail[2..] } else { tail };
     }

@@ -30,13 +30,7 @@ pub(super) struct Materials {
 
 impl Materials {
     /// The index in the scene of a material, which is added if it is new.
-    pub(super) fn get(
-        &mut self,
-        key: Key,
-        document: &Document,
-        scene: &mut Scene,
-        warnings: &mut Warnings,
-    ) -> u32 {
+    pub(super) fn get(&mut self, key: Key, document: &Document, scene: &mut Scene, warnings: &mut Warnings) -> u32 {
         if let Some(&index) = self.index.get(&key) {
             return index;
         }
@@ -65,57 +59,36 @@ impl Materials {
     /// Builds the reflectors of textured and coloured materials anew, from their mean base colour.
     pub(super) fn apply_means(&self, scene: &mut Scene) {
         let means = crate::mesh::mean_base_colors(scene);
-        for ((material, mean), [metallic, roughness]) in
-            scene.materials.iter_mut().zip(means).zip(&self.factors)
-        {
+        for ((material, mean), [metallic, roughness]) in scene.materials.iter_mut().zip(means).zip(&self.factors) {
             if let Some(mean) = mean {
-                material.reflector =
-                    metallic_roughness(mean.clamp(Rgb::ZERO, Rgb::ONE), *metallic, *roughness);
+                material.reflector = metallic_roughness(mean.clamp(Rgb::ZERO, Rgb::ONE), *metallic, *roughness);
             }
         }
     }
 
-    fn convert(
-        &mut self,
-        number: usize,
-        textured: bool,
-        document: &Document,
-        warnings: &mut Warnings,
-    ) -> Material {
+    fn convert(&mut self, number: usize, textured: bool, document: &Document, warnings: &mut Warnings) -> Material {
         let source = &document.root.materials[number];
         let path = format!("materials[{number}]");
-        let name = source
-            .name
-            .clone()
-            .unwrap_or_else(|| format!("material {number}"));
+        let name = source.name.clone().unwrap_or_else(|| format!("material {number}"));
         let pbr = &source.pbr_metallic_roughness;
         let mut fixed = false;
         let mut unit = |value: f32| {
             fixed |= !(0.0..=1.0).contains(&value);
-            if value.is_nan() {
-                0.0
-            } else {
-                value.clamp(0.0, 1.0)
-            }
+            if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
         };
         let [r, g, b, _] = pbr.base_color_factor.0.map(&mut unit);
         let base_color = Rgb::new(r, g, b);
         let mut metallic = unit(pbr.metallic_factor.0);
         let mut roughness = unit(pbr.roughness_factor.0);
         if fixed {
-            warnings.add("material factors outside 0…1 are clamped", || {
-                path.clone()
-            });
+            warnings.add("material factors outside 0…1 are clamped", || path.clone());
         }
         let strength = (source.extensions.as_ref())
             .and_then(|e| e.emissive_strength.as_ref())
             .map_or(1.0, |strength| strength.emissive_strength.0);
         let mut radiance = Rgb::from(source.emissive_factor.0) * strength;
         if !(radiance.is_finite() && radiance.min_element() >= 0.0) {
-            warnings.add(
-                "emission that is negative or not finite is left out",
-                || path.clone(),
-            );
+            warnings.add("emission that is negative or not finite is left out", || path.clone());
             radiance = Rgb::ZERO;
         }
 
@@ -123,8 +96,7 @@ impl Materials {
         if let Some(info) = &pbr.metallic_roughness_texture {
             // Green is roughness, blue is metallic.
             let place = format!("{path}.pbrMetallicRoughness.metallicRoughnessTexture");
-            if let Some(texels) = self.image(document, info.index.value(), false, &place, warnings)
-            {
+            if let Some(texels) = self.image(document, info.index.value(), false, &place, warnings) {
                 let mean = texels.mean();
                 roughness *= mean.y;
                 metallic *= mean.z;
@@ -148,52 +120,30 @@ impl Materials {
         }
         match source.alpha_mode {
             Checked::Valid(AlphaMode::Mask) => {
-                not_simulated.push("alphaMode MASK is taken as opaque")
+                not_simulated.push("alphaMode MASK is taken as opaque");
             }
             Checked::Valid(AlphaMode::Blend) => {
-                not_simulated.push("alphaMode BLEND is taken as opaque")
+                not_simulated.push("alphaMode BLEND is taken as opaque");
             }
             _ => {}
         }
         if source.double_sided && radiance != Rgb::ZERO {
             not_simulated.push("a doubleSided emitter emits from its front only");
         }
-        if !not_simulated.is_empty()
-            && !self
-                .index
-                .keys()
-                .any(|k| k.0 == Some(number) && k.1 != textured)
-        {
-            warnings.add(
-                format!("material '{name}': {}", not_simulated.join("; ")),
-                || path.clone(),
-            );
+        if !not_simulated.is_empty() && !self.index.keys().any(|k| k.0 == Some(number) && k.1 != textured) {
+            warnings.add(format!("material '{name}': {}", not_simulated.join("; ")), || path.clone());
         }
 
-        let texture = pbr
-            .base_color_texture
-            .as_ref()
-            .filter(|_| textured)
-            .and_then(|info| {
-                let place = format!("{path}.pbrMetallicRoughness.baseColorTexture");
-                let texels = self.image(document, info.index.value(), true, &place, warnings)?;
-                let transform = transform(info);
-                if !transform.is_finite() {
-                    warnings.add("a texture transform that is not finite is left out", || {
-                        place
-                    });
-                }
-                let transform = if transform.is_finite() {
-                    transform
-                } else {
-                    Mat3::IDENTITY
-                };
-                Some(Texture {
-                    texels,
-                    transform,
-                    wrap: wrap(document, info.index.value()),
-                })
-            });
+        let texture = pbr.base_color_texture.as_ref().filter(|_| textured).and_then(|info| {
+            let place = format!("{path}.pbrMetallicRoughness.baseColorTexture");
+            let texels = self.image(document, info.index.value(), true, &place, warnings)?;
+            let transform = transform(info);
+            if !transform.is_finite() {
+                warnings.add("a texture transform that is not finite is left out", || place);
+            }
+            let transform = if transform.is_finite() { transform } else { Mat3::IDENTITY };
+            Some(Texture { texels, transform, wrap: wrap(document, info.index.value()) })
+        });
         self.factors.push([metallic, roughness]);
         Material {
             reflector: metallic_roughness(base_color, metallic, roughness),
@@ -223,28 +173,20 @@ impl Materials {
         let bytes = match (&image.buffer_view, &image.uri) {
             (Some(view), _) => document.view(view.value(), &at).map(std::borrow::Cow::from),
             (None, Some(uri)) => document.read_uri(uri, &at).map(std::borrow::Cow::from),
-            (None, None) => {
-                Err(document.wrong(&at, "it has neither a uri nor a buffer view", "give it one"))
-            }
+            (None, None) => Err(document.wrong(&at, "it has neither a uri nor a buffer view", "give it one")),
         };
-        let decoded = bytes
-            .map_err(|e| e.to_string())
-            .and_then(|bytes| decode(&bytes, srgb));
+        let decoded = bytes.map_err(|e| e.to_string()).and_then(|bytes| decode(&bytes, srgb));
         let texels = match decoded {
             Ok((texels, halved)) => {
                 if halved {
-                    warnings.add(
-                        "an image of more than 4096 x 4096 pixels is used at a lower resolution",
-                        || at,
-                    );
+                    warnings.add("an image of more than 4096 x 4096 pixels is used at a lower resolution", || at);
                 }
                 Some(Arc::new(texels))
             }
             Err(e) => {
-                warnings.add(
-                    format!("texture left out, its image is no PNG or JPEG that can be read: {e}"),
-                    || place.to_owned(),
-                );
+                warnings.add(format!("texture left out, its image is no PNG or JPEG that can be read: {e}"), || {
+                    place.to_owned()
+                });
                 None
             }
         };
@@ -255,29 +197,15 @@ impl Materials {
 
 /// The set of texture coordinates that the base colour texture of a material uses, if it has one.
 pub(super) fn base_color_set(document: &Document, material: usize) -> Option<u32> {
-    let info = document.root.materials[material]
-        .pbr_metallic_roughness
-        .base_color_texture
-        .as_ref()?;
-    let transform = info
-        .extensions
-        .as_ref()
-        .and_then(|e| e.texture_transform.as_ref());
-    Some(
-        transform
-            .and_then(|t| t.tex_coord)
-            .unwrap_or(info.tex_coord),
-    )
+    let info = document.root.materials[material].pbr_metallic_roughness.base_color_texture.as_ref()?;
+    let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+    Some(transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord))
 }
 
 /// `KHR_texture_transform`: scaled, then rotated, then moved. Positive angles turn u towards −v, which is
 /// counter-clockwise as v points down; the matrix listed in early texts of the extension turned the other way.
 fn transform(info: &json::texture::Info) -> Mat3 {
-    let Some(t) = info
-        .extensions
-        .as_ref()
-        .and_then(|e| e.texture_transform.as_ref())
-    else {
+    let Some(t) = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref()) else {
         return Mat3::IDENTITY;
     };
     Mat3::from_translation(Vec2::from(t.offset.0))

@@ -44,12 +44,7 @@ pub(super) struct Library {
 
 impl Library {
     /// Adds the materials of a library; a name that is known already is given its new meaning.
-    pub(super) fn read(
-        &mut self,
-        bytes: &[u8],
-        path: &Path,
-        warnings: &mut Warnings,
-    ) -> Result<(), SceneError> {
+    pub(super) fn read(&mut self, bytes: &[u8], path: &Path, warnings: &mut Warnings) -> Result<(), SceneError> {
         let first = self.materials.len();
         for (line, statement) in statements(&String::from_utf8_lossy(bytes)) {
             let place = || format!("{}:{line}", path.display());
@@ -57,17 +52,10 @@ impl Library {
             let Some(keyword) = words.next() else {
                 continue;
             };
-            let rest = statement
-                .trim_start()
-                .strip_prefix(keyword)
-                .unwrap_or("")
-                .trim();
+            let rest = statement.trim_start().strip_prefix(keyword).unwrap_or("").trim();
             if keyword == "newmtl" {
                 self.index.insert(rest.to_owned(), self.materials.len());
-                self.materials.push(Source {
-                    name: rest.to_owned(),
-                    ..Source::default()
-                });
+                self.materials.push(Source { name: rest.to_owned(), ..Source::default() });
                 continue;
             }
             let known = self.materials.len() > first;
@@ -78,35 +66,21 @@ impl Library {
             match keyword {
                 "Kd" => material.diffuse = color(rest, place, warnings)?.or(material.diffuse),
                 "Ks" => {
-                    material.specular = color(rest, place, warnings)?.unwrap_or(material.specular)
+                    material.specular = color(rest, place, warnings)?.unwrap_or(material.specular);
                 }
                 "Ke" => {
-                    material.radiance = color(rest, place, warnings)?.unwrap_or(material.radiance)
+                    material.radiance = color(rest, place, warnings)?.unwrap_or(material.radiance);
                 }
                 "Ns" => material.exponent = number(words.next(), place)? as f32,
                 "Pr" => material.roughness = Some(number(words.next(), place)? as f32),
                 "Pm" => material.metallic = Some(number(words.next(), place)? as f32),
                 "illum" => material.illumination = words.next().and_then(|w| w.parse().ok()),
-                "d" if words
-                    .next()
-                    .is_some_and(|w| w.parse().is_ok_and(|d: f32| d < 1.0)) =>
-                {
-                    warnings.add(
-                        format!(
-                            "material '{}': its transparency is not simulated",
-                            material.name
-                        ),
-                        place,
-                    );
+                "d" if words.next().is_some_and(|w| w.parse().is_ok_and(|d: f32| d < 1.0)) => {
+                    warnings.add(format!("material '{}': its transparency is not simulated", material.name), place);
                 }
                 "map_Kd" => material.texture = texture(rest, path, place, warnings),
-                _ if keyword.starts_with("map_")
-                    || ["bump", "disp", "decal", "norm", "refl"].contains(&keyword) =>
-                {
-                    warnings.add(
-                        format!("material '{}': {keyword} is left out", material.name),
-                        place,
-                    );
+                _ if keyword.starts_with("map_") || ["bump", "disp", "decal", "norm", "refl"].contains(&keyword) => {
+                    warnings.add(format!("material '{}': {keyword} is left out", material.name), place);
                 }
                 _ => {}
             }
@@ -123,35 +97,19 @@ impl Source {
     fn tame(&mut self, path: &Path, warnings: &mut Warnings) {
         let place = || format!("{}: {}", path.display(), self.name);
         let unit = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) };
-        let positive = |c: Rgb| {
-            Rgb::from(
-                c.to_array()
-                    .map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 }),
-            )
-        };
+        let positive = |c: Rgb| Rgb::from(c.to_array().map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 }));
         let diffuse = positive(self.diffuse.unwrap_or(Rgb::splat(GREY)));
         // Illumination models 0 and 1 have no highlight.
         let matte = matches!(self.illumination, Some(0 | 1));
-        let specular = if matte || self.is_pbr() {
-            Rgb::ZERO
-        } else {
-            positive(self.specular)
-        };
+        let specular = if matte || self.is_pbr() { Rgb::ZERO } else { positive(self.specular) };
         let largest = (diffuse + specular).max_element();
         if largest > 1.0 {
-            warnings.add(
-                "Kd + Ks is scaled to at most 1: no surface reflects more than it receives",
-                place,
-            );
+            warnings.add("Kd + Ks is scaled to at most 1: no surface reflects more than it receives", place);
         }
         let scale = 1.0 / largest.max(1.0);
         self.diffuse = Some(diffuse * scale);
         self.specular = specular * scale;
-        self.exponent = if self.exponent.is_nan() {
-            0.0
-        } else {
-            self.exponent.clamp(0.0, MAX_EXPONENT)
-        };
+        self.exponent = if self.exponent.is_nan() { 0.0 } else { self.exponent.clamp(0.0, MAX_EXPONENT) };
         self.radiance = positive(self.radiance);
         self.roughness = self.roughness.map(unit);
         self.metallic = self.metallic.map(unit);
@@ -192,11 +150,7 @@ pub(super) fn material(source: Option<&Source>, textured: bool) -> Material {
 }
 
 /// A colour of three numbers, or of one for grey; `None`, with a warning, where it is a spectrum or CIE XYZ.
-fn color(
-    rest: &str,
-    place: impl Fn() -> String,
-    warnings: &mut Warnings,
-) -> Result<Option<Rgb>, SceneError> {
+fn color(rest: &str, place: impl Fn() -> String, warnings: &mut Warnings) -> Result<Option<Rgb>, SceneError> {
     let mut words = rest.split_whitespace().peekable();
     if let Some(kind @ ("spectral" | "xyz")) = words.peek().copied() {
         warnings.add(format!("a colour given as '{kind}' is left out"), place);
@@ -211,12 +165,7 @@ fn color(
 }
 
 /// `map_Kd [-s u v w] [-o u v w] [-clamp on] … file`.
-fn texture(
-    rest: &str,
-    path: &Path,
-    place: impl Fn() -> String,
-    warnings: &mut Warnings,
-) -> Option<Texture> {
+fn texture(rest: &str, path: &Path, place: impl Fn() -> String, warnings: &mut Warnings) -> Option<Texture> {
     let mut scale = Vec2::ONE;
     let mut offset = Vec2::ZERO;
     let mut wrap = Wrap::Repeat;
@@ -239,12 +188,7 @@ fn texture(
             arguments.push(word);
             tail = after.trim_start();
         }
-        let at = |i: usize| {
-            arguments
-                .get(i)
-                .and_then(|w| w.parse().ok())
-                .filter(|x: &f32| x.is_finite())
-        };
+        let at = |i: usize| arguments.get(i).and_then(|w| w.parse().ok()).filter(|x: &f32| x.is_finite());
         match name {
             "s" => scale = Vec2::new(at(0).unwrap_or(1.0), at(1).unwrap_or(1.0)),
             "o" => offset = Vec2::new(at(0).unwrap_or(0.0), at(1).unwrap_or(0.0)),
@@ -253,29 +197,17 @@ fn texture(
         }
         rest = tail;
     }
-    let file = path
-        .parent()
-        .unwrap_or(Path::new(""))
-        .join(rest.replace('\\', "/"));
-    let decoded = std::fs::read(&file)
-        .map_err(|e| e.to_string())
-        .and_then(|bytes| decode(&bytes, true));
+    let file = path.parent().unwrap_or(Path::new("")).join(rest.replace('\\', "/"));
+    let decoded = std::fs::read(&file).map_err(|e| e.to_string()).and_then(|bytes| decode(&bytes, true));
     match decoded {
         Ok((texels, halved)) => {
             if halved {
-                warnings.add(
-                    "an image of more than 4096 x 4096 pixels is used at a lower resolution",
-                    place,
-                );
+                warnings.add("an image of more than 4096 x 4096 pixels is used at a lower resolution", place);
             }
             // The options act where v goes up, but texture coordinates have v turned down on reading.
             let turn = Mat3::from_cols_array(&[1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 1.0]);
             let options = Mat3::from_translation(offset) * Mat3::from_diagonal(scale.extend(1.0));
-            Some(Texture {
-                texels: Arc::new(texels),
-                transform: turn * options * turn,
-                wrap: [wrap; 2],
-            })
+            Some(Texture { texels: Arc::new(texels), transform: turn * options * turn, wrap: [wrap; 2] })
         }
         Err(e) => {
             warnings.add(format!("texture '{}' left out: {e}", file.display()), place);

@@ -1,0 +1,36 @@
+//! From a scene to its solution.
+
+use glossy_ext::GlossyField;
+use glossy_ext::haar::Refinement;
+use hr_diffuse::{Progress, Settings, Solution, SolveError, Solver};
+use hr_scene::Scene;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// A scene and the light in it.
+#[derive(Debug)]
+pub struct Solved {
+    /// Geometry, materials and cameras.
+    pub scene: Arc<Scene>,
+    /// The light.
+    pub solution: Solution<GlossyField>,
+}
+
+impl Solved {
+    /// Solves for the light in a scene. `watch` is told how far it is; once it breaks, what there is is finished
+    /// without refining any more.
+    ///
+    /// # Errors
+    /// Where the scene makes no sense to the solver.
+    pub fn new(
+        scene: Arc<Scene>,
+        settings: Settings,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Self, SolveError> {
+        let field = GlossyField::new(&scene.reflectors(), Refinement::default());
+        let mut solver = Solver::new(&scene.input(), settings, field)?;
+        solver.solve(watch);
+        let solution = solver.finish(watch);
+        Ok(Self { scene, solution })
+    }
+}
