@@ -18,7 +18,7 @@ const FRAMES: usize = 240;
 const FALLBACK_FRAMES: &str = "hr-view-frames";
 
 /// A solved scene: to walk through, and to take pictures of.
-pub trait Solved: Walkable {
+pub trait Shown: Walkable {
     /// Linear radiance as a camera sees it. `watch` is told the share that is done, from any thread.
     fn image(&self, camera: &Camera, mode: Mode, watch: &(dyn Fn(f32) + Sync)) -> Image;
 
@@ -88,18 +88,12 @@ fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
 }
 
 /// Solves for the light to the accuracy asked for, or until the time is up.
-fn solve(_scene: &Arc<Scene>, _args: &Args, _progress: &Progress) -> Result<Box<dyn Solved>, ViewError> {
+fn solve(_scene: &Arc<Scene>, _args: &Args, _progress: &Progress) -> Result<Box<dyn Shown>, ViewError> {
     Err(ViewError::Arguments("this build cannot solve scenes; build hr-view with its solver".into()))
 }
 
 /// Shows a solution as asked, or as frames where no window can be opened.
-fn show(
-    solved: &dyn Solved,
-    scene: &Scene,
-    args: &Args,
-    output: &Output,
-    progress: &Progress,
-) -> Result<(), ViewError> {
+fn show(solved: &dyn Shown, scene: &Scene, args: &Args, output: &Output, progress: &Progress) -> Result<(), ViewError> {
     match output {
         Output::Image(path) => image(solved, scene, args.mode, path, progress),
         Output::Frames(folder) => frames(solved, scene, args.mode, folder, progress),
@@ -117,7 +111,7 @@ fn show(
     }
 }
 
-fn image(solved: &dyn Solved, scene: &Scene, mode: Mode, path: &Path, progress: &Progress) -> Result<(), ViewError> {
+fn image(solved: &dyn Shown, scene: &Scene, mode: Mode, path: &Path, progress: &Progress) -> Result<(), ViewError> {
     let watch = |share| progress.at("taking the picture", share, None);
     let image = solved.image(&scene.default_camera(), mode, &watch);
     image.save(path, &ToneMap::default(), scene.primaries)?;
@@ -125,7 +119,7 @@ fn image(solved: &dyn Solved, scene: &Scene, mode: Mode, path: &Path, progress: 
 }
 
 /// Numbered PNG files, all exposed alike: as the first one wants it.
-fn frames(solved: &dyn Solved, scene: &Scene, mode: Mode, folder: &Path, progress: &Progress) -> Result<(), ViewError> {
+fn frames(solved: &dyn Shown, scene: &Scene, mode: Mode, folder: &Path, progress: &Progress) -> Result<(), ViewError> {
     std::fs::create_dir_all(folder).map_err(|source| SceneError::Io { path: folder.to_path_buf(), source })?;
     let mut tone_map = ToneMap::default();
     for (number, camera) in scene.walkthrough(FRAMES).iter().enumerate() {

@@ -6,6 +6,7 @@ pub mod display;
 pub mod error;
 pub mod progress;
 pub mod raycast;
+pub mod solved;
 pub mod window;
 
 pub use args::{Args, Mode, Parsed};
