@@ -1,3 +1,43 @@
-//! Walk through a glossy global illumination solution.
+//! Walk through a glossy global illumination solution: a window, a command line, images and frames.
+
+pub mod app;
+pub mod args;
+pub mod display;
+pub mod error;
+pub mod progress;
 pub mod raycast;
 pub mod solved;
+pub mod window;
+
+pub use args::{Args, Mode, Parsed};
+pub use error::ViewError;
+
+use std::ffi::OsString;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// The program: reads the command line, does what it says, and ends with status 0, or with 1 and one line on standard
+/// error.
+pub fn main_with(line: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let done = match Args::read(line) {
+        Ok(Parsed::Run(args)) => app::run(&args),
+        Ok(Parsed::Print(text)) => {
+            // Whoever closes the pipe has read enough.
+            drop(write!(std::io::stdout(), "{text}"));
+            Ok(())
+        }
+        Err(error) => Err(error),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            drop(writeln!(std::io::stderr(), "hr-view: {}", one_line(&error.to_string())));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Error texts of files and libraries may bring their own line breaks.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,209 @@
+//! The command line.
+
+use crate::ViewError;
+use clap::error::ErrorKind;
+use clap::{Parser, ValueEnum};
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// Walk through the global illumination of a scene, glossy reflection included.
+///
+/// The scene is solved once, to the accuracy asked for; then a window opens and you walk. H in the window shows the
+/// keys.
+#[derive(Clone, Debug, PartialEq, Parser)]
+#[command(name = "hr-view", version)]
+pub struct Args {
+    /// A .mgf, .gltf, .glb or .obj file, or the name of a built-in scene
+    #[arg(value_name = "SCENE", default_value = hr_scene::builtin::DEFAULT)]
+    pub scene: String,
+
+    /// Where to look from: {"eye":[x,y,z],"target":[x,y,z],"up":[x,y,z],"fov_x":degrees,"width":w,"height":h}
+    #[arg(long, value_name = "FILE.json")]
+    pub camera: Option<PathBuf>,
+
+    /// No window: one image; .pfm and .exr hold linear radiance, unclamped, .png is tone-mapped
+    #[arg(long, value_name = "OUT")]
+    pub image: Option<PathBuf>,
+
+    /// No window: PNG frames along the walkthrough's camera path
+    #[arg(long, value_name = "DIR", conflicts_with = "image")]
+    pub frames: Option<PathBuf>,
+
+    /// How glossy light comes into images and frames
+    #[arg(long, value_name = "M", value_enum, default_value_t)]
+    pub mode: Mode,
+
+    /// The accuracy asked for: relative error of the solution, 0.001 to 1
+    #[arg(long, value_name = "E", value_parser = error, default_value_t = 0.05, allow_negative_numbers = true)]
+    pub error: f32,
+
+    /// Stop refining after so many seconds and show what there is
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    pub time_budget: Option<f64>,
+
+    /// Worker threads; as many as the machine has where it is not given
+    #[arg(long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
+    pub threads: Option<usize>,
+
+    /// Write times, counts, what was skipped and why, and peak memory
+    #[arg(long, value_name = "OUT.json")]
+    pub stats: Option<PathBuf>,
+
+    /// Keep the solution (not available yet)
+    #[arg(long, value_name = "OUT")]
+    pub save: Option<PathBuf>,
+
+    /// Look at a kept solution without solving (not available yet)
+    #[arg(long, value_name = "IN")]
+    pub load: Option<PathBuf>,
+
+    /// One self-contained file that walks through the solution in a browser (not available yet)
+    #[arg(long, value_name = "OUT.html")]
+    pub html: Option<PathBuf>,
+}
+
+/// How glossy light comes into images and frames; the window always evaluates distributions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Mode {
+    /// evaluate the outgoing distributions (the paper's walkthrough)
+    #[default]
+    Distributions,
+    /// reflect the incident samples at each pixel
+    Samples,
+    /// final gather at each pixel, for stills
+    Gather,
+}
+
+/// What came of reading the command line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Parsed {
+    /// Something to do.
+    Run(Box<Args>),
+    /// Help or version was asked for: text for standard output.
+    Print(String),
+}
+
+impl Args {
+    /// Reads a command line, the program's name first.
+    ///
+    /// # Errors
+    /// [`ViewError::Arguments`], in one line, for what cannot be meant, and for options that are not available yet.
+    pub fn read(line: impl IntoIterator<Item = OsString>) -> Result<Parsed, ViewError> {
+        let args = match Self::try_parse_from(line) {
+            Ok(args) => args,
+            Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+                return Ok(Parsed::Print(error.to_string()));
+            }
+            Err(error) => return Err(ViewError::Arguments(one_line(&error))),
+        };
+        let later = [("--save", &args.save), ("--load", &args.load), ("--html", &args.html)];
+        if let Some((option, _)) = later.iter().find(|(_, value)| value.is_some()) {
+            return Err(ViewError::Arguments(format!("{option} is not available yet; use --image or --frames")));
+        }
+        Ok(Parsed::Run(Box::new(args)))
+    }
+}
+
+/// clap's message without its headings, usage and blank lines.
+fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let text = text.strip_prefix("error: ").unwrap_or(&text);
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let kept: Vec<_> = lines.take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more")).collect();
+    // A list of what is missing follows a colon, tips and possible values follow what they are about.
+    let joined = kept.join("; ").replace(":; ", ": ");
+    format!("{joined}; hr-view --help lists the options")
+}
+
+fn error(text: &str) -> Result<f32, String> {
+    let value: f32 = text.parse().map_err(|_| "must be a number from 0.001 to 1, such as 0.02".to_owned())?;
+    if (0.001..=1.0).contains(&value) { Ok(value) } else { Err("must be from 0.001 to 1, such as 0.02".into()) }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        // A duration of more seconds than this would not fit one.
+        Ok(value) if (0.0..=1e9).contains(&value) => Ok(value),
+        _ => Err("must be a number of seconds from 0 to 1e9, such as 10".into()),
+    }
+}
+
+fn threads(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(value) if (1..=1024).contains(&value) => Ok(value),
+        _ => Err("must be a whole number from 1 to 1024".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn read(line: &str) -> Result<Parsed, ViewError> {
+        Args::read(std::iter::once("hr-view").chain(line.split_whitespace()).map(OsString::from))
+    }
+
+    fn run(line: &str) -> Args {
+        match read(line) {
+            Ok(Parsed::Run(args)) => *args,
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_definition_is_sound() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn everything_has_its_place() {
+        let nothing = run("");
+        assert_eq!(nothing.scene, hr_scene::builtin::DEFAULT, "no scene is the default scene");
+        assert_eq!(nothing.mode, Mode::Distributions, "the paper's mode is the default");
+        let all = run("a.mgf --camera c.json --image o.exr --mode gather --error 0.02 --time-budget 10 --threads 3 \
+             --stats s.json");
+        assert_eq!(all.scene, "a.mgf", "scene");
+        assert_eq!(all.camera, Some("c.json".into()), "camera");
+        assert_eq!(all.image, Some("o.exr".into()), "image");
+        assert_eq!(all.mode, Mode::Gather, "mode");
+        assert_eq!((all.error, all.time_budget, all.threads), (0.02, Some(10.0), Some(3)), "numbers");
+        assert_eq!(all.stats, Some("s.json".into()), "stats");
+        assert_eq!(run("--frames out").frames, Some("out".into()), "frames");
+    }
+
+    #[test]
+    fn mistakes_are_one_line_that_helps() {
+        let cases = [
+            ("--error 0", "0.001"),
+            ("--error x", "0.02"),
+            ("--error -1", "0.001"),
+            ("--error nan", "0.001"),
+            ("--time-budget -1", "seconds"),
+            ("--time-budget inf", "seconds"),
+            ("--threads 0", "1 to 1024"),
+            ("--threads 99999999999999999999", "1 to 1024"),
+            ("--mode best", "gather"),
+            ("--imgae o.png", "--image"),
+            ("--image", "--image"),
+            ("--image a.png --frames b", "--frames"),
+            ("a.mgf b.mgf", "b.mgf"),
+            ("--save x", "not available yet"),
+            ("--load x", "not available yet"),
+            ("--html x", "not available yet"),
+        ];
+        for (line, hint) in cases {
+            let Err(error) = read(line) else { panic!("'{line}' was taken") };
+            let text = error.to_string();
+            assert!(text.contains(hint) && text.lines().count() == 1, "'{line}' gives: {text}");
+        }
+    }
+
+    #[test]
+    fn help_and_version_are_no_errors() {
+        for (line, part) in [("--help", "--time-budget"), ("--version", env!("CARGO_PKG_VERSION"))] {
+            let Ok(Parsed::Print(text)) = read(line) else { panic!("{line} is an error") };
+            assert!(text.contains(part), "{line} says {text}");
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Pictures without a screen: screenshots, and frames drawn by the device without a window.
+
+use super::WindowError;
+use super::gpu::{Gpu, one_line};
+use super::lists::split;
+use super::refresh::Refresh;
+use super::scene_buffers::{Frame, Pass, SceneBuffers};
+use super::tone::Tone;
+use super::view::View;
+use crate::display::Walkable;
+use hr_scene::Camera;
+use std::path::Path;
+
+/// An 8-bit sRGB picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Snapshot {
+    /// Width in pixels, ≥ 1.
+    pub width: u32,
+    /// Height in pixels, ≥ 1.
+    pub height: u32,
+    /// `4 · width · height` bytes RGBA, row 0 on top.
+    pub rgba: Vec<u8>,
+}
+
+impl Snapshot {
+    /// Draws what a camera sees with the graphics device, the same picture as the window's, without a window.
+    ///
+    /// # Errors
+    /// [`WindowError::NoAdapter`] without a graphics device, [`WindowError::Mesh`] for a mesh that does not
+    /// [check](crate::display::DisplayMesh::check), [`WindowError::TooLarge`] where mesh or picture exceed the device.
+    pub fn of(walk: &dyn Walkable, camera: &Camera, tone: Option<&Tone>) -> Result<Self, WindowError> {
+        let mesh = walk.mesh();
+        mesh.check()?;
+        let gpu = Gpu::new()?;
+        let lists = split(mesh);
+        let scene = SceneBuffers::new(&gpu, mesh, &lists)?;
+        let size = [camera.width.max(1), camera.height.max(1)];
+        let view = View::of_camera(camera);
+        let mut refresh = Refresh::new(walk, &lists[1]);
+        let sight = view.sight(mesh.origin, f64::from(size[0]) / f64::from(size[1]));
+        refresh.update(walk, &lists[1], view.eye, &sight, 0.0);
+        scene.set_glossy(&gpu, refresh.radiance());
+        let automatic = Tone::for_mesh(mesh);
+        let frame = Frame { view: &view, tone: tone.unwrap_or(&automatic), mesh };
+        Self::draw(&gpu, &scene, size, &frame)
+    }
+
+    /// Draws one frame into memory.
+    pub(super) fn draw(
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        [width, height]: [u32; 2],
+        frame: &Frame<'_>,
+    ) -> Result<Self, WindowError> {
+        let limit = gpu.device.limits().max_texture_dimension_2d;
+        if width > limit || height > limit {
+            return Err(WindowError::TooLarge { size: width.max(height).into(), limit: limit.into() });
+        }
+        let format = wgpu::TextureFormat::Rgba8Unorm;
+        let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("snapshot"),
+            size,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("snapshot"),
+            size: u64::from(row) * u64::from(height),
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Pass::new(gpu, scene, format, gpu.samples(format)).draw(
+            gpu,
+            scene,
+            &mut encoder,
+            &view,
+            [width, height],
+            frame,
+        );
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None },
+            },
+            size,
+        );
+        gpu.queue.submit([encoder.finish()]);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        // A receiver that is gone has given up on the picture.
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| WindowError::Device(one_line(&e)))?;
+        gpu.fault()?;
+        match receiver.try_recv() {
+            Ok(Ok(())) => {}
+            _ => {
+                return Err(WindowError::Device("the picture could not be read back".into()));
+            }
+        }
+        let mapped = buffer.get_mapped_range(..).map_err(|e| WindowError::Device(one_line(&e)))?;
+        let bytes = mapped.to_vec();
+        let rgba = bytes.chunks(row as usize).flat_map(|line| &line[..4 * width as usize]).copied().collect();
+        Ok(Self { width, height, rgba })
+    }
+
+    /// Writes a PNG file.
+    ///
+    /// # Errors
+    /// [`WindowError::Save`] where it cannot be written.
+    pub fn save_png(&self, path: &Path) -> Result<(), WindowError> {
+        let format = image::ImageFormat::Png;
+        image::save_buffer_with_format(
+            path,
+            &self.rgba,
+            self.width,
+            self.height,
+            image::ExtendedColorType::Rgba8,
+            format,
+        )
+        .map_err(|error| WindowError::Save { path: path.to_path_buf(), reason: one_line(&error) })
+    }
+}

@@ -1,0 +1,135 @@
+//! Where the eye is and what it sees.
+
+use super::refresh::Sight;
+use glam::DVec3;
+use hr_scene::Camera;
+
+/// Directions closer to the vertical than this (radians) are not looked in: the horizon would flip.
+const STEEPEST: f64 = 0.01;
+
+/// An eye with its directions of view, in scene units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct View {
+    /// Where it is.
+    pub(super) eye: DVec3,
+    /// Unit vector to the right of the picture.
+    pub(super) right: DVec3,
+    /// Unit vector to the top of the picture.
+    pub(super) up: DVec3,
+    /// Unit vector into the picture.
+    pub(super) forward: DVec3,
+    /// Horizontal field of view in degrees.
+    pub(super) fov_x: f64,
+}
+
+impl View {
+    /// From `eye` along `forward`, with `up` roughly up; any length, and any direction where they are degenerate.
+    pub(super) fn looking(eye: DVec3, forward: DVec3, up: DVec3, fov_x: f64) -> Self {
+        let forward = forward.try_normalize().unwrap_or(DVec3::X);
+        let up = up.try_normalize().unwrap_or(DVec3::Z);
+        let right = forward.cross(up);
+        let right = if right.length() < 1e-9 { forward.any_orthonormal_vector() } else { right.normalize() };
+        let fov_x = if fov_x.is_finite() { fov_x.clamp(1.0, 170.0) } else { 60.0 };
+        let eye = if eye.is_finite() { eye } else { DVec3::ZERO };
+        Self { eye, right, up: right.cross(forward), forward, fov_x }
+    }
+
+    /// What a camera shows.
+    pub(super) fn of_camera(camera: &Camera) -> Self {
+        let (eye, target) = (DVec3::from(camera.eye), DVec3::from(camera.target));
+        Self::looking(eye, target - eye, camera.up.into(), camera.fov_x)
+    }
+
+    /// From outside at a box with these corners, the whole of it in the picture.
+    pub(super) fn around(low: DVec3, high: DVec3, up: DVec3) -> Self {
+        let aside = up.any_orthonormal_vector();
+        let from = (aside * 2.0 + up.cross(aside) + up).normalize();
+        let center = 0.5 * (low + high);
+        let radius = (0.5 * (high - low).length()).max(f64::MIN_POSITIVE);
+        // 45° across is 26° high in a 16:9 window; a sphere at 4.5 radii takes 25.7°.
+        Self::looking(center + from * (4.5 * radius), -from, up, 45.0)
+    }
+
+    /// Turns by angles in radians to the right and up, about the vertical `up`; levels the horizon.
+    pub(super) fn turned(&self, right: f64, rise: f64, up: DVec3) -> Self {
+        let pitch = self.forward.dot(up).clamp(-1.0, 1.0).asin() + rise;
+        let limit = std::f64::consts::FRAC_PI_2 - STEEPEST;
+        let pitch = pitch.clamp(-limit, limit);
+        // Looking along the vertical, the top of the picture says where forward is.
+        let level = |v: DVec3| (v - up * v.dot(up)).try_normalize().filter(|_| (v - up * v.dot(up)).length() > 1e-6);
+        let ahead = level(self.forward)
+            .or_else(|| level(self.up * -self.forward.dot(up).signum()))
+            .unwrap_or_else(|| up.any_orthonormal_vector());
+        let (sin, cos) = right.sin_cos();
+        let ahead = ahead * cos + ahead.cross(up) * sin;
+        Self::looking(self.eye, ahead * pitch.cos() + up * pitch.sin(), up, self.fov_x)
+    }
+
+    /// Horizontal and vertical scale of the projection (cotangents of half the fields of view) for a picture of
+    /// width / height `aspect`.
+    pub(super) fn scales(&self, aspect: f64) -> [f64; 2] {
+        let x = 1.0 / (0.5 * self.fov_x.to_radians()).tan();
+        [x, x * aspect]
+    }
+
+    /// The part of space that a picture of width / height `aspect` shows, relative to `origin`.
+    pub(super) fn sight(&self, origin: DVec3, aspect: f64) -> Sight {
+        let [x, y] = self.scales(aspect);
+        let side = |across: DVec3, scale: f64| (self.forward + across * scale).as_vec3();
+        Sight {
+            eye: (self.eye - origin).as_vec3(),
+            sides: [side(self.right, x), side(-self.right, x), side(self.up, y), side(-self.up, y)],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_bound_the_field_of_view() {
+        let view = View::looking(DVec3::ZERO, DVec3::X, DVec3::Z, 90.0);
+        let inside =
+            |p: DVec3, aspect: f64| view.sight(DVec3::ZERO, aspect).sides.iter().all(|s| s.dot(p.as_vec3()) >= 0.0);
+        assert!(inside(DVec3::new(1.0, 0.99, 0.0), 2.0), "just left of the right edge");
+        assert!(!inside(DVec3::new(1.0, 1.01, 0.0), 2.0), "just beyond it");
+        // Twice as wide as high: the tangent of half the vertical angle is 1/2.
+        assert!(inside(DVec3::new(1.0, 0.0, 0.49), 2.0), "just below the top");
+        assert!(!inside(DVec3::new(1.0, 0.0, 0.51), 2.0), "just above it");
+        assert!(!inside(DVec3::NEG_X, 2.0), "behind");
+    }
+
+    #[test]
+    fn turning_keeps_the_horizon_and_stops_short_of_the_pole() {
+        let view = View::looking(DVec3::ZERO, DVec3::X, DVec3::new(0.0, 0.3, 1.0), 60.0);
+        let right = view.turned(std::f64::consts::FRAC_PI_2, 0.0, DVec3::Z);
+        assert!((right.forward - DVec3::NEG_Y).length() < 1e-12, "right of x, z up, is −y: {}", right.forward);
+        assert!(right.right.z.abs() < 1e-12, "the camera's roll is gone");
+        let high = view.turned(0.0, 9.0, DVec3::Z);
+        assert!(high.forward.z > 0.99 && high.forward.x > 0.0, "not over the top: {}", high.forward);
+        let down = View::looking(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 60.0).turned(0.0, 0.5, DVec3::Z);
+        assert!(down.forward.y > 0.0 && down.forward.is_finite(), "from straight down, up is toward the top: {down:?}");
+    }
+
+    #[test]
+    fn degenerate_cameras_still_see() {
+        for (forward, up) in [(DVec3::ZERO, DVec3::ZERO), (DVec3::Z, DVec3::Z), (DVec3::NAN, DVec3::X)] {
+            let view = View::looking(DVec3::NAN, forward, up, f64::NAN);
+            assert!(view.right.is_finite() && view.up.is_finite() && view.eye.is_finite(), "{forward} {up}: {view:?}");
+        }
+    }
+
+    #[test]
+    fn the_whole_box_is_seen_from_outside() {
+        let (low, high) = (DVec3::new(-3.0, 0.0, 5.0), DVec3::new(1.0, 2.0, 6.0));
+        let view = View::around(low, high, DVec3::Y);
+        let sight = view.sight(DVec3::ZERO, 1.6);
+        for corner in 0..8 {
+            let pick = |bit: i32, a: f64, b: f64| if corner & bit == 0 { a } else { b };
+            let p = DVec3::new(pick(1, low.x, high.x), pick(2, low.y, high.y), pick(4, low.z, high.z));
+            let seen = sight.sides.iter().all(|s| s.dot(p.as_vec3() - sight.eye) >= 0.0);
+            assert!(seen, "corner {p} is outside the picture");
+        }
+    }
+}
