@@ -6,7 +6,7 @@
 //! that touch: the kernel's denominator carries the sender's area.
 
 use crate::geometry::{Domain, Geometry};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use smallvec::SmallVec;
 use std::f64::consts::PI;
 
@@ -17,6 +17,10 @@ const FAR: f32 = 0.06;
 const CURVED_FAR: f32 = 0.35;
 /// Splits of a curved sender end here: 4⁴ pieces.
 const CURVED_DEPTH: u32 = 4;
+
+/// Points nearer than this to a polygon's plane (unit space) are in it, and see nothing of it: coordinates are rounded
+/// to 6e-8, and what the contour integral makes of rounding within the polygon is anything up to 1.
+pub(crate) const IN_PLANE: f32 = 1e-6;
 
 /// Form factor from the point `x` with unit normal `n` to a planar polygon (any number of corners,
 /// counter-clockwise seen from its front), by Lambert's formula F = ½π Σ Γᵢ·n over the edges, after clipping at
@@ -122,13 +126,15 @@ pub fn point_to_surface(geometry: &Geometry, domain: &Domain, back: bool, x: Vec
     match geometry {
         Geometry::Triangle(_) | Geometry::Quad(_) => {
             let corners = polygon_corners(geometry, domain, back);
+            let facing = geometry.normal(geometry.middle(*domain)) * if back { -1.0 } else { 1.0 };
+            if (x - corners[0]).dot(facing) <= IN_PLANE {
+                return 0.0;
+            }
             let center = corners.iter().sum::<Vec3>() / corners.len() as f32;
             let radius2 = corners.iter().map(|c| c.distance_squared(center)).fold(0.0, f32::max);
-            let side = if back { -1.0 } else { 1.0 };
             let d2 = center.distance_squared(x);
             if radius2 < FAR * FAR * d2 {
-                let normal = geometry.normal(Vec2::splat(0.25)) * side;
-                return kernel(x, n, center, normal, geometry.area(*domain));
+                return kernel(x, n, center, facing, geometry.area(*domain));
             }
             point_to_polygon(x, n, &corners)
         }

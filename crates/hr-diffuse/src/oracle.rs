@@ -5,6 +5,7 @@
 use crate::hierarchy::{Element, Kind, SceneData};
 use crate::{Cone, LightKind};
 use glam::Vec3;
+use crate::form_factor::IN_PLANE;
 use std::f32::consts::PI;
 
 /// Bounds of what one unit of the sender's radiosity (or intensity, for lights without extent) makes of
@@ -26,7 +27,7 @@ pub fn factor_bounds(scene: &SceneData, receiver: &Element, sender: &Element) ->
     if sender.kind == Kind::Light {
         return light_bounds(scene, receiver, sender);
     }
-    if behind(receiver, sender) || behind(sender, receiver) {
+    if behind(scene, receiver, sender) || behind(scene, sender, receiver) {
         return None;
     }
     let apart = sender.center - receiver.center;
@@ -75,7 +76,7 @@ fn light_bounds(scene: &SceneData, receiver: &Element, sender: &Element) -> Opti
         let (min, max) = if flat { (low.max(0.0), high) } else { (1.0, 1.0) };
         return Some(FactorBounds { min, max, from_sender: Cone::single(direction) });
     }
-    if behind(receiver, sender) {
+    if behind(scene, receiver, sender) {
         return None;
     }
     let apart = sender.center - receiver.center;
@@ -117,14 +118,17 @@ pub fn spot_ramp(cosine: f32, cos_inner: f32, cos_outer: f32) -> f32 {
 }
 
 /// Whether all of `other` lies behind the plane of `element` (or in it).
-fn behind(element: &Element, other: &Element) -> bool {
+fn behind(scene: &SceneData, element: &Element, other: &Element) -> bool {
     if !element.is_flat() {
         return false;
     }
     let n = element.normals.axis;
-    let farthest = Vec3::select(n.cmpge(Vec3::ZERO), other.bounds[1], other.bounds[0]);
-    // Rounding of unit-space coordinates is of the order of 1e-7.
-    (farthest - element.center).dot(n) <= 2e-6
+    let height = |point: Vec3| (point - element.center).dot(n);
+    if other.is_patch() && scene.surfaces()[other.source as usize].is_polygon() {
+        let geometry = &scene.surfaces()[other.source as usize];
+        return geometry.corners(other.domain).iter().all(|&uv| height(geometry.point(uv)) <= IN_PLANE);
+    }
+    height(Vec3::select(n.cmpge(Vec3::ZERO), other.bounds[1], other.bounds[0])) <= IN_PLANE
 }
 
 /// Smallest and largest distance between points of two boxes.
