@@ -7,8 +7,10 @@ pub mod gltf_file;
 pub mod image_file;
 pub mod mgf;
 pub mod obj_file;
+mod polygon;
 pub mod scene;
 pub mod tonemap;
+mod warnings;
 
 pub use camera::Camera;
 pub use error::SceneError;
