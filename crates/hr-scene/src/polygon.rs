@@ -62,6 +62,9 @@ const CONVEX: f64 = 1e-3;
 /// Triangles are joined where the quadrilateral's corners all turn left by more than this (sine of 15°).
 const WELL_SHAPED: f64 = 0.26;
 
+/// An end of an edge this close to another edge only touches it, relative to the polygon's extent.
+const TOUCHING: f64 = 1e-9;
+
 /// How much the pieces' area may differ from the polygon's, relatively; more means that the outline crosses itself.
 const AREA_TOLERANCE: f64 = 1e-5;
 
@@ -94,7 +97,8 @@ pub(crate) fn normal(points: &[DVec3]) -> Result<DVec3, PolygonError> {
 }
 
 /// Cuts a polygon into pieces. `holes` has the index of each hole's first corner, ascending; the outline ends where
-/// the first one begins. Holes may run either way round.
+/// the first one begins. Holes may run either way round. Time is
+/// about linear in the number of corners for usual polygons, cubic for the worst ones.
 ///
 /// # Errors
 /// Where the outline has no area, crosses itself or a hole, or is not finite.
@@ -114,6 +118,9 @@ pub(crate) fn pieces(points: &[DVec3], holes: &[usize]) -> Result<Vec<Piece>, Po
             }
             _ => {}
         }
+    }
+    if crosses_itself(&flat, &kept, &kept_holes) {
+        return Err(PolygonError::Crossing);
     }
     let triangles = triangles(&flat, &kept, &kept_holes)?;
     Ok(joined(&points, &flat, &triangles))
@@ -170,6 +177,35 @@ fn is_straight(flat: &[DVec2], a: usize, b: usize, c: usize) -> bool {
     to.perp_dot(from).abs() <= STRAIGHT * to.length() * from.length()
 }
 
+/// Where each loop begins and ends in a list of `count` corners.
+fn loops(count: usize, holes: &[usize]) -> impl Iterator<Item = (usize, usize)> {
+    std::iter::once(0).chain(holes.iter().copied()).zip(holes.iter().copied().chain([count]))
+}
+
+/// Whether two edges cross. Edges that only touch, as seams do, are fine. Ear clipping would cover some polygons that
+/// cross themselves with triangles that overlap.
+fn crosses_itself(flat: &[DVec2], kept: &[usize], holes: &[usize]) -> bool {
+    let mut edges = Vec::with_capacity(kept.len());
+    for (start, end) in loops(kept.len(), holes) {
+        edges.extend((start..end).map(|k| [flat[kept[k]], flat[kept[if k + 1 < end { k + 1 } else { start }]]]));
+    }
+    edges.sort_by(|a, b| a[0].x.min(a[1].x).total_cmp(&b[0].x.min(b[1].x)));
+    edges.iter().enumerate().any(|(k, &edge)| {
+        let right = edge[0].x.max(edge[1].x);
+        edges[k + 1..].iter().take_while(|other| other[0].x.min(other[1].x) <= right).any(|&other| crosses(edge, other))
+    })
+}
+
+/// Whether two edges cross such that both ends of each are clearly on different sides of the other.
+fn crosses([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> bool {
+    let apart = |p: DVec2, q: DVec2, a: DVec2, b: DVec2| {
+        let edge = b - a;
+        let (left, right) = (edge.perp_dot(p - a), edge.perp_dot(q - a));
+        left * right < 0.0 && left.abs().min(right.abs()) > TOUCHING * edge.length()
+    };
+    apart(c, d, a, b) && apart(a, b, c, d)
+}
+
 /// Triangles of the polygon whose corners `kept` lists, counter-clockwise.
 fn triangles(flat: &[DVec2], kept: &[usize], holes: &[usize]) -> Result<Vec<[usize; 3]>, PolygonError> {
     let corners: Vec<_> = kept.iter().map(|&k| flat[k].to_array()).collect();
@@ -194,10 +230,9 @@ fn triangles(flat: &[DVec2], kept: &[usize], holes: &[usize]) -> Result<Vec<[usi
         .flatten()
         .collect();
 
-    let loops: Vec<_> = std::iter::once(0).chain(holes.iter().copied()).chain([kept.len()]).collect();
     let mut expected = 0.0;
-    for (k, ends) in loops.windows(2).enumerate() {
-        let area = twice_area(&(ends[0]..ends[1]).collect::<Vec<_>>());
+    for (k, (start, end)) in loops(kept.len(), holes).enumerate() {
+        let area = twice_area(&(start..end).collect::<Vec<_>>());
         expected += if k == 0 { area } else { -area.abs() };
     }
     let found: f64 = indices.chunks_exact(3).map(twice_area).sum();
@@ -368,6 +403,17 @@ mod tests {
         assert_eq!(pieces(&p, &[]), Err(PolygonError::NotFinite), "differences overflow");
         let p = polygon(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [1.0, -1.0], [0.0, 4.0]]);
         assert_eq!(pieces(&p, &[]), Err(PolygonError::Crossing), "crossing itself");
+        let square = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
+        let across = [[3.0, 1.0], [5.0, 1.0], [5.0, 2.0], [3.0, 2.0]];
+        let outside = across.map(|[x, y]| [x + 3.0, y]);
+        for hole in [across, outside] {
+            let p = polygon(&[square, hole].concat());
+            assert_eq!(pieces(&p, &[4]), Err(PolygonError::Crossing), "a hole that is not inside");
+        }
+        // Winding round twice: ear clipping alone would cover it with triangles that overlap.
+        let pentagram: Vec<_> = (0..5).map(|k| f64::from(2 * k) * std::f64::consts::TAU / 5.0).collect();
+        let p = polygon(&pentagram.iter().map(|angle| [angle.cos(), angle.sin()]).collect::<Vec<_>>());
+        assert_eq!(pieces(&p, &[]), Err(PolygonError::Crossing), "pentagram");
     }
 
     proptest! {

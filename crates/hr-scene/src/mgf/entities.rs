@@ -3,12 +3,16 @@
 use super::color::Chromaticity;
 use super::fault::{Fault, count, counted, exactly, fault, number, numbers, quoted};
 use super::geometry::{Sink, Vertex};
+use super::lexer::File;
 use super::material::Tint;
 use super::reader::Reader;
 use glam::DVec3;
 
-/// Cutting a polygon takes at worst the square of its corners; that square over this is charged as words.
-const CUTTING_COST: u64 = 1024;
+/// Most corners of a polygon: more than fit into the 4096 characters that MGF allows a line to have.
+const MAX_CORNERS: usize = 4096;
+
+/// Cutting a polygon takes at worst the cube of its corners; that cube over this is charged as words.
+const CUTTING_COST: u64 = 1 << 16;
 
 /// The largest exitance in W/m²; the sun's surface has 6.3e7, and RGB values must fit single precision.
 const MAX_EXITANCE: f64 = 1e30;
@@ -147,38 +151,38 @@ impl Reader<'_> {
         index
     }
 
-    pub(super) fn geometry(&mut self, keyword: &str, words: &[&str]) -> Result<(), Fault> {
-        match keyword {
+    pub(super) fn geometry(&mut self, file: &File, statement: usize, words: &[&str]) -> Result<(), Fault> {
+        match file.keyword(statement) {
             "f" => {
                 let corners = self.corners(words, "f v1 v2 v3 …")?;
-                self.sink().face(&corners, &[]);
+                self.sink(file, statement).face(&corners, &[]);
             }
             "fh" => {
                 let (corners, holes) = self.loops(words)?;
-                self.sink().face(&corners, &holes);
+                self.sink(file, statement).face(&corners, &holes);
             }
             "sph" => {
                 let [center, radius] = exactly(words, "sph center radius")?;
                 let (center, radius) = (self.vertex(center)?, number(radius)?);
-                self.sink().sphere(center, radius);
+                self.sink(file, statement).sphere(center, radius);
             }
             "cyl" => {
                 let [v1, radius, v2] = exactly(words, "cyl v1 radius v2")?;
                 let (ends, radius) = ([self.vertex(v1)?, self.vertex(v2)?], number(radius)?);
-                self.sink().cone(ends, [radius; 2])?;
+                self.sink(file, statement).cone(ends, [radius; 2])?;
             }
             "cone" => {
                 let [v1, r1, v2, r2] = exactly(words, "cone v1 radius1 v2 radius2")?;
                 let (ends, radii) = ([self.vertex(v1)?, self.vertex(v2)?], [number(r1)?, number(r2)?]);
-                self.sink().cone(ends, radii)?;
+                self.sink(file, statement).cone(ends, radii)?;
             }
             "ring" => {
                 let (center, [inner, outer]) = self.axis(words, "ring center inner_radius outer_radius")?;
-                self.sink().ring(center, inner, outer)?;
+                self.sink(file, statement).ring(center, inner, outer)?;
             }
             "torus" => {
                 let (center, [inner, outer]) = self.axis(words, "torus center inner_radius outer_radius")?;
-                self.sink().torus(center, inner, outer)?;
+                self.sink(file, statement).torus(center, inner, outer)?;
             }
             _ => {
                 const USAGE: &str = "prism v1 v2 v3 … length";
@@ -186,20 +190,15 @@ impl Reader<'_> {
                     return fault("a prism without vertices", format!("write `{USAGE}`"));
                 };
                 let (corners, length) = (self.corners(names, USAGE)?, number(length)?);
-                self.sink().prism(&corners, length);
+                self.sink(file, statement).prism(&corners, length);
             }
         }
         Ok(())
     }
 
-    fn sink(&mut self) -> Sink<'_> {
-        Sink {
-            matrix: self.matrix(),
-            material: self.material(),
-            place: self.place(),
-            surfaces: &mut self.surfaces,
-            warnings: &mut self.warnings,
-        }
+    fn sink<'a>(&'a mut self, file: &'a File, statement: usize) -> Sink<'a> {
+        let (matrix, material) = (self.matrix(), self.material());
+        Sink { matrix, material, file, statement, surfaces: &mut self.surfaces, warnings: &mut self.warnings }
     }
 
     fn vertex(&self, name: &str) -> Result<Vertex, Fault> {
@@ -208,14 +207,13 @@ impl Reader<'_> {
 
     /// Three or more vertices.
     fn corners(&mut self, names: &[&str], usage: &str) -> Result<Vec<Vertex>, Fault> {
-        let n = names.len() as u64;
-        self.charge(n * n / CUTTING_COST)?;
         if names.len() < 3 {
             return fault(
-                format!("a polygon of {}", counted(names.len(), "vertex").replace("vertexs", "vertices")),
-                format!("it needs at least three: `{usage}`"),
+                format!("a polygon of {} where three or more belong", counted(names.len(), "name")),
+                format!("write `{usage}`"),
             );
         }
+        self.charge_polygon(names.len())?;
         names.iter().map(|name| self.vertex(name)).collect()
     }
 
@@ -228,9 +226,21 @@ impl Reader<'_> {
             }
             corners.extend(self.corners(names, "fh v1 v2 v3 … - h1 h2 h3 … - …")?);
         }
-        let n = words.len() as u64;
-        self.charge(n * n / CUTTING_COST)?;
+        if !holes.is_empty() {
+            self.charge_polygon(corners.len())?;
+        }
         Ok((corners, holes))
+    }
+
+    fn charge_polygon(&mut self, corners: usize) -> Result<(), Fault> {
+        if corners > MAX_CORNERS {
+            return fault(
+                format!("a polygon of {corners} corners, where at most {MAX_CORNERS} are allowed"),
+                "split it into several",
+            );
+        }
+        let corners = corners as u64;
+        self.charge(corners * corners * corners / CUTTING_COST)
     }
 
     /// A vertex that needs a normal, and two radii.

@@ -1,6 +1,7 @@
 //! Geometric entities: from vertices and radii in the file's local coordinates to surfaces in the scene's.
 
 use super::fault::{Fault, fault};
+use super::lexer::File;
 use super::transform::{is_mirrored, scale};
 use crate::polygon::{self, Piece};
 use crate::warnings::Warnings;
@@ -25,15 +26,17 @@ const THICKEST_TUBE: f64 = 1.0 - 1e-9;
 pub(super) struct Sink<'a> {
     pub(super) matrix: DAffine3,
     pub(super) material: u32,
-    /// File and line of the statement.
-    pub(super) place: &'a dyn Fn() -> String,
+    /// The statement, for warnings.
+    pub(super) file: &'a File,
+    pub(super) statement: usize,
     pub(super) surfaces: &'a mut Vec<Surface>,
     pub(super) warnings: &'a mut Warnings,
 }
 
 impl Sink<'_> {
     fn warn(&mut self, text: &str) {
-        self.warnings.add(text, self.place);
+        let (file, statement) = (self.file, self.statement);
+        self.warnings.add(text, || file.place(statement));
     }
 
     fn push(&mut self, shape: Shape, flip: bool) {

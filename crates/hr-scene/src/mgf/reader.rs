@@ -175,7 +175,9 @@ impl Reader<'_> {
             "n" => self.vertices.current_mut().normal = unit(DVec3::from(numbers(words, "n dx dy dz")?)),
             "cxy" | "cspec" | "cct" | "cmix" => self.color(keyword, words)?,
             "rd" | "rs" | "td" | "ts" | "ed" | "sides" | "ir" => self.property(keyword, words)?,
-            "f" | "fh" | "sph" | "cyl" | "cone" | "ring" | "torus" | "prism" => self.geometry(keyword, words)?,
+            "f" | "fh" | "sph" | "cyl" | "cone" | "ring" | "torus" | "prism" => {
+                self.geometry(file, statement, words)?
+            }
             "o" => self.object(words),
             "xf" => self.transform(file, statement, words)?,
             "i" => self.include(file, words)?,

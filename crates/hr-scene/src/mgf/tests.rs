@@ -88,7 +88,7 @@ fn faces() {
 #[test]
 fn degenerate_geometry_is_left_out_and_counted() {
     let text = "f a b a\nf a a a\nfh a b b - e f g\nsph a 0\ncyl a 0 b\ncyl a 1 a\nprism a b a 1\n\
-        prism a b c 0\nf a b c d a\nv x =\n p 1e308 0 0\nv y =\n p -1e308 0 0\nf a x y\nv a =\n n 0 0 1\n\
+        prism a b c 0\nf a b c d a\nv x =\n p 1.5e308 0 0\nv y =\n p -1.5e308 1e308 0\nf x y a\nv a =\n n 0 0 1\n\
         ring a 2 2\ntorus a 1 1\nv m =\n p 1 -1 0\nf a b c m d\n";
     let s = scene(&format!("{SQUARE}{text}"));
     assert_eq!(s.surfaces.len(), 1, "one square is good: {:?}", s.surfaces);
@@ -347,9 +347,9 @@ fn includes() {
 fn errors_say_where_what_and_what_would_be_right() {
     for (text, message) in [
         ("\n\nf a b v3", "dir/t.mgf:3: undefined vertex 'a'; define it with `v a =` before use"),
-        ("v a =\nf a a", "dir/t.mgf:2: a polygon of 2 vertices; it needs at least three: `f v1 v2 v3 …`"),
-        ("f", "a polygon of 0 vertices; it needs"),
-        ("v a =\nfh a a a - a", "dir/t.mgf:2: a polygon of 1 vertex; it needs"),
+        ("v a =\nf a a", "dir/t.mgf:2: a polygon of 2 names where three or more belong; write `f v1 v2 v3 …`"),
+        ("f", "a polygon of 0 names where"),
+        ("v a =\nfh a a a - a", "dir/t.mgf:2: a polygon of 1 name where"),
         (
             "v a =\n\\\np 1 2",
             "dir/t.mgf:2: 2 arguments where 3 belong; write `p x y z`, comments on lines of their own",
@@ -388,7 +388,7 @@ fn errors_say_where_what_and_what_would_be_right() {
         ("v a =\nsph a", "1 argument where 2 belong; write `sph center radius`"),
         ("v a =\ncyl a 1", "2 arguments where 3 belong; write `cyl v1 radius v2`"),
         ("prism", "a prism without vertices; write `prism v1 v2 v3 … length`"),
-        ("v a =\nprism a a 1", "a polygon of 2 vertices; it needs at least three: `prism"),
+        ("v a =\nprism a a 1", "a polygon of 2 names where three or more belong; write `prism"),
         ("v a =\nprism a a a a", "'a' is not a finite number"),
         ("xf", "'xf' closes a transform that was not opened in this file; delete it"),
         ("xf -a 3 -mx", "an array (xf … -a) without an end; close it with `xf`"),
@@ -405,7 +405,8 @@ fn errors_say_where_what_and_what_would_be_right() {
 
 #[test]
 fn explosions_are_refused() {
-    let nested = "xf -a 1000 -t 1 0 0\n".repeat(4) + "v o =\nsph o 1\n" + &"xf\n".repeat(4);
+    let comment = "# words that take no time ".repeat(50);
+    let nested = "xf -a 1000 -t 1 0 0\n".repeat(3) + &comment + "\n" + &"xf\n".repeat(3);
     for (text, message) in [
         (nested.as_str(), "come to more than 20000000 words; make arrays smaller"),
         ("xf -a 1000000 -a 1000000 -mx\nxf", "an array of 1000000000000 instances, where at most 1000000 are allowed"),
@@ -417,10 +418,13 @@ fn explosions_are_refused() {
     }
     let deep = "xf -mx\n".repeat(100_000) + "v o =\nsph o 1\n" + &"xf\n".repeat(100_000);
     assert_eq!(scene(&deep).surfaces.len(), 1, "transforms that are no arrays nest as deep as you like");
-    let corners: String = (0..30_000).map(|k| format!("v v{k} =\n p {k} {} 0\n", k * k % 7919)).collect();
-    let names: String = (0..30_000).map(|k| format!(" v{k}")).collect();
-    let text = format!("{corners}xf -a 100 -mx\nf{names}\nxf\n");
-    assert!(error(&text).contains("large polygons"), "a huge polygon, again and again");
+    let circle = |n: u32| {
+        let corner = |k: u32| (f64::from(k) / f64::from(n) * std::f64::consts::TAU).sin_cos();
+        let vertices: String = (0..n).map(|k| format!("v v{k} =\n p {} {} 0\n", corner(k).1, corner(k).0)).collect();
+        vertices + &(0..n).map(|k| format!(" v{k}")).collect::<String>().replacen(' ', "xf -a 20 -mx\nf ", 1) + "\nxf\n"
+    };
+    assert!(error(&circle(4097)).contains("a polygon of 4097 corners, where at most 4096 are allowed"), "too large");
+    assert!(error(&circle(4096)).contains("large polygons come to more than"), "large, and again and again");
 }
 
 /// A scene with every entity, to be mutilated.
