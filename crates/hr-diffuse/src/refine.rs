@@ -24,6 +24,9 @@ use std::time::Instant;
 const GEOMETRY_SHARE: f32 = 0.25;
 /// The same where it stems from the sender's uneven radiosity.
 const RADIOSITY_SHARE: f32 = 0.5;
+/// The same where it stems from the sender's directional distribution: of the directions that lead to a receiver few
+/// see the peak of a narrow lobe.
+const DIRECTIONAL_SHARE: f32 = 0.05;
 /// Segments per link: first a few, then as many as its light is worth.
 const FIRST_SEGMENTS: u32 = 4;
 const MOST_SEGMENTS: u32 = 32;
@@ -205,16 +208,28 @@ struct Interval {
     most: f32,
     /// Uncertainty from geometry.
     geometry: f32,
-    /// Uncertainty from the sender's radiosity.
+    /// Uncertainty from the sender's uneven radiosity.
     radiosity: f32,
+    /// Uncertainty from the sender's directional light.
+    directional: f32,
+}
+
+impl Interval {
+    fn error(&self) -> f32 {
+        GEOMETRY_SHARE * self.geometry + RADIOSITY_SHARE * self.radiosity + DIRECTIONAL_SHARE * self.directional
+    }
 }
 
 fn interval<L: LightField>(light: Light<'_, L>, sender: u32, bounds: &FactorBounds) -> Interval {
     let (low, high) = light.emitted_bounds(sender, &bounds.from_sender);
+    let [least, most] = light.diffuse_range(sender);
+    let (factor, spread) = (0.5 * (bounds.max + bounds.min), (most - least).max_element());
+    let typical = (0.5 * (least + most)).max(light.emitted(sender, bounds.from_sender.axis)).max_element();
     Interval {
         most: high.max_element() * bounds.max,
-        geometry: (0.5 * (low + high)).max_element() * (bounds.max - bounds.min),
-        radiosity: (high - low).max_element() * 0.5 * (bounds.max + bounds.min),
+        geometry: typical * (bounds.max - bounds.min),
+        radiosity: spread * factor,
+        directional: ((high - low).max_element() - spread).max(0.0) * factor,
     }
 }
 
@@ -244,9 +259,9 @@ fn decide<L: LightField>(
     let interval = interval(light, pair.sender, &bounds);
     let weight = r.importance * (r.area / tolerance.area).powf(*EX);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
-    let by_bounds = weight * (GEOMETRY_SHARE * interval.geometry + RADIOSITY_SHARE * interval.radiosity);
+    let by_bounds = weight * interval.error();
     if by_bounds > tolerance.error {
-        let prefer_sender = interval.radiosity > 2.0 * interval.geometry;
+        let prefer_sender = RADIOSITY_SHARE * interval.radiosity > GEOMETRY_SHARE * interval.geometry;
         if let Some(verdict) = split(choose(light, pair, tolerance, prefer_sender)) {
             return verdict;
         }

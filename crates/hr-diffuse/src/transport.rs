@@ -95,7 +95,7 @@ impl<L: LightField> Light<'_, L> {
             let intensity = self.scene.lights[element.source as usize].intensity;
             return (intensity, intensity);
         }
-        let [mut low, mut high] = self.exitant.range[sender as usize];
+        let [mut low, mut high] = self.diffuse_range(sender);
         if element.active {
             let (least, most) = self.field.radiance_bounds(self.state(sender), away);
             let scale = if element.is_flat() {
@@ -108,6 +108,16 @@ impl<L: LightField> Light<'_, L> {
             high += most * scale;
         }
         (low.max(Rgb::ZERO), high.max(Rgb::ZERO))
+    }
+
+    /// Smallest and largest diffuse radiosity below a node; the intensity of a light.
+    #[must_use]
+    pub fn diffuse_range(&self, sender: u32) -> [Rgb; 2] {
+        let element = self.element(sender);
+        if element.kind == Kind::Light {
+            return [self.scene.lights[element.source as usize].intensity; 2];
+        }
+        self.exitant.range[sender as usize]
     }
 
     /// Whether nothing leaves a node.

@@ -10,15 +10,13 @@ pub mod image_file;
 mod mesh;
 pub mod mgf;
 pub mod obj_file;
-mod reflectors;
+mod polygon;
 pub mod scene;
 #[cfg(test)]
 mod testing;
 pub mod texture;
 pub mod tonemap;
-mod viewpoint;
 mod warnings;
-pub mod whole_file;
 
 pub use camera::Camera;
 pub use error::SceneError;
