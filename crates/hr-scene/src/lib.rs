@@ -11,12 +11,15 @@ mod mesh;
 pub mod mgf;
 pub mod obj_file;
 mod polygon;
+mod reflectors;
 pub mod scene;
 #[cfg(test)]
 mod testing;
 pub mod texture;
 pub mod tonemap;
+mod viewpoint;
 mod warnings;
+pub mod whole_file;
 
 pub use camera::Camera;
 pub use error::SceneError;

@@ -5,8 +5,7 @@ use super::color::Chromaticity;
 use crate::Material;
 use crate::warnings::Warnings;
 use glam::DVec3;
-use glossy_ext::{Reflector, Rgb};
-use std::sync::Arc;
+use glossy_ext::Rgb;
 
 /// An amount (Y) of a colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
