@@ -28,8 +28,23 @@ const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
 const FAINT_SHARE: f32 = 0.5;
 /// A leaf's light is reflected anew once its irradiance has changed by this share of the error asked for.
 const REFLECT_SHARE: f32 = 0.5;
+/// Iterations end when all that are to come would change the solution by less than this share of the error.
+const CONVERGED_SHARE: f32 = 0.02;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
+
+/// What a leaf's own place makes of the light that was pushed down to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Placed {
+    /// Factor for light that its ancestors received.
+    inherited: f32,
+    /// Factor for all light: below 1 where form factors would sum to more than 1.
+    limit: f32,
+}
+
+impl Placed {
+    const UNKNOWN: Self = Self { inherited: 1.0, limit: 1.0 };
+}
 
 /// What is asked of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,8 +103,8 @@ pub struct Solver<L: LightField = ()> {
     own: Vec<Rgb>,
     /// Light through a node's own links, on nodes that are not flat.
     transfers: Vec<Vec<Transfer>>,
-    /// What each leaf's own place makes of the light that its ancestors' links carry, as a factor.
-    placed: Vec<f32>,
+    /// By node, for leaves: see [`Placed`].
+    placed: Vec<Placed>,
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
     /// diffuse light.
     faint: Vec<Rgb>,
@@ -153,14 +168,14 @@ impl<L: LightField> Solver<L> {
     /// refining any more.
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
-        for (pass, looseness) in PASSES.iter().chain(std::iter::repeat(&1.0)).enumerate().take(2 * PASSES.len()) {
+        for (pass, looseness) in PASSES.iter().chain(std::iter::repeat(&1.0)).enumerate().take(PASSES.len() + 1) {
             let last = pass + 1 >= PASSES.len();
             let changed = self.refine(pass, *looseness, &mut stopped, watch);
-            let goal = if last || stopped { 0.1 * self.settings.error } else { self.settings.error };
+            let goal = if last || stopped { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
             let most = if last || stopped { MOST_ITERATIONS } else { 3 };
             for iteration in 0..most {
-                // Once the light is there, and once more when it has spread.
-                if iteration == 1 || iteration == 6 {
+                // Once the light is there, and what is linked is nearly fine enough.
+                if iteration == 1 && pass + 2 >= PASSES.len() {
                     self.place();
                 }
                 let residual = self.iterate();
@@ -330,10 +345,14 @@ impl<L: LightField> Solver<L> {
             .with_min_len(64)
             .map(|&leaf| {
                 let element = light.element(leaf);
+                let placed = self.placed.get(leaf as usize).copied().unwrap_or(Placed::UNKNOWN);
+                // Its own links are averages over the leaf already.
                 let mut sum = Rgb::ZERO;
                 let mut node = leaf;
                 loop {
-                    sum += self.own[node as usize];
+                    if node != leaf {
+                        sum += self.own[node as usize];
+                    }
                     for transfer in &self.transfers[node as usize] {
                         let (direction, scale) = renewed(light, transfer, element.center, node);
                         sum += transfer.irradiance * (element.mean_cosine(direction) * scale);
@@ -343,12 +362,11 @@ impl<L: LightField> Solver<L> {
                     }
                     node = elements.nodes[node as usize].parent;
                 }
-                sum
+                (self.own[leaf as usize] + sum * placed.inherited) * placed.limit
             })
             .collect();
-        self.placed.resize(elements.nodes.len(), 1.0);
         for (leaf, sum) in leaves.into_iter().zip(sums) {
-            self.exitant.irradiance[leaf as usize] = sum * self.placed[leaf as usize];
+            self.exitant.irradiance[leaf as usize] = sum;
         }
     }
 
@@ -360,7 +378,7 @@ impl<L: LightField> Solver<L> {
         let start = Instant::now();
         let (elements, light) = (&self.elements, self.light());
         let leaves: Vec<u32> = elements.patch_leaves().collect();
-        let factors: Vec<f32> = leaves
+        let factors: Vec<Placed> = leaves
             .par_iter()
             .with_min_len(16)
             .map(|&leaf| {
@@ -372,7 +390,17 @@ impl<L: LightField> Solver<L> {
                     let receiver = light.element(node);
                     for link in self.links.of(node) {
                         let visible = link.visibility.abs();
-                        if visible > 0.0 {
+                        if visible > 0.0 && node == leaf && receiver.is_flat() {
+                            let sender = light.element(link.sender);
+                            let away = -light.direction_to(receiver.center, link.sender);
+                            row += visible
+                                * link.factor
+                                * match sender.kind {
+                                    Kind::Light => 0.0,
+                                    Kind::Cluster => sender.mean_cosine(away),
+                                    Kind::Front | Kind::Back => 1.0,
+                                };
+                        } else if visible > 0.0 {
                             for &(x, n, weight) in &points {
                                 exact += visible * weight * light.irradiance_at(x, n, link.sender).element_sum();
                                 row += visible * weight * light.share_at(x, n, link.sender);
@@ -399,12 +427,12 @@ impl<L: LightField> Solver<L> {
                     node = receiver.parent;
                 }
                 // Surfaces that lie in one another's plane hide each other by turns, which no ray can tell.
-                let placed = if pushed > 0.0 && exact > 0.0 { (exact / pushed).clamp(0.25, 4.0) } else { 1.0 };
-                placed / row.max(1.0)
+                let inherited = if pushed > 0.0 && exact > 0.0 { (exact / pushed).clamp(0.25, 4.0) } else { 1.0 };
+                Placed { inherited, limit: row.max(1.0).recip() }
             })
             .collect();
         self.placed.clear();
-        self.placed.resize(elements.nodes.len(), 1.0);
+        self.placed.resize(elements.nodes.len(), Placed::UNKNOWN);
         for (leaf, factor) in leaves.into_iter().zip(factors) {
             self.placed[leaf as usize] = factor;
         }
