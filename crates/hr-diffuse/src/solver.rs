@@ -391,15 +391,7 @@ impl<L: LightField> Solver<L> {
                     for link in self.links.of(node) {
                         let visible = link.visibility.abs();
                         if visible > 0.0 && node == leaf && receiver.is_flat() {
-                            let sender = light.element(link.sender);
-                            let away = -light.direction_to(receiver.center, link.sender);
-                            row += visible
-                                * link.factor
-                                * match sender.kind {
-                                    Kind::Light => 0.0,
-                                    Kind::Cluster => sender.mean_cosine(away),
-                                    Kind::Front | Kind::Back => 1.0,
-                                };
+                            row += if light.element(link.sender).is_patch() { visible * link.factor } else { 0.0 };
                         } else if visible > 0.0 {
                             for &(x, n, weight) in &points {
                                 exact += visible * weight * light.irradiance_at(x, n, link.sender).element_sum();
