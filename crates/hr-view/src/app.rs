@@ -47,12 +47,31 @@ enum Output {
 impl Output {
     /// What the command line asks for; refuses what could not be written before anything is computed.
     fn of(args: &Args) -> Result<Self, ViewError> {
+        args.stats.as_deref().map_or(Ok(()), has_folder)?;
         if let Some(path) = &args.image {
             ImageKind::of(path)?;
+            has_folder(path)?;
             return Ok(Self::Image(path.clone()));
         }
-        Ok(args.frames.clone().map_or(Self::Window, Self::Frames))
+        if let Some(folder) = &args.frames {
+            make_folder(folder)?;
+            return Ok(Self::Frames(folder.clone()));
+        }
+        Ok(Self::Window)
     }
+}
+
+/// Whether the folder that a file is to be written to is there.
+fn has_folder(path: &Path) -> Result<(), SceneError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let is_folder = std::fs::metadata(folder).map_or_else(Err, |found| {
+        if found.is_dir() { Ok(()) } else { Err(std::io::ErrorKind::NotADirectory.into()) }
+    });
+    is_folder.map_err(|source| SceneError::Io { path: path.to_path_buf(), source })
+}
+
+fn make_folder(folder: &Path) -> Result<(), SceneError> {
+    std::fs::create_dir_all(folder).map_err(|source| SceneError::Io { path: folder.to_path_buf(), source })
 }
 
 /// What there is to show, and how.
@@ -172,7 +191,7 @@ impl Show<'_> {
 
     /// Numbered PNG files, all exposed alike.
     fn frames(&self, folder: &Path) -> Result<(), ViewError> {
-        std::fs::create_dir_all(folder).map_err(|source| SceneError::Io { path: folder.to_path_buf(), source })?;
+        make_folder(folder)?;
         let scene = &self.solved.scene;
         let caster = self.caster().with_grid(FRAME_GRID);
         let resized = |mut camera: Camera, size: [u32; 2]| {
