@@ -2,8 +2,8 @@
 //! would see of it, i.e. irradiance / radiosity, in 0…1.
 //!
 //! Polygons use Lambert's contour integral, clipped at the receiver's horizon; whole spheres their closed form;
-//! other curved pieces are split until a point-to-disk kernel is accurate. Nowhere does 1/r² meet two surfaces
-//! that touch: the kernel's denominator carries the sender's area.
+//! other curved pieces are split until a point kernel is accurate. Nowhere does 1/r² meet two surfaces that touch: the
+//! kernel is bounded.
 
 use crate::geometry::{Domain, Geometry};
 use glam::{DVec3, Vec3};
@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 /// relative error is about the ratio's square: under 1%.
 const FAR: f32 = 0.06;
 /// The same for pieces of curved senders, which have no closed form and are split down to it.
-const CURVED_FAR: f32 = 0.35;
+const CURVED_FAR: f32 = 0.25;
 /// Splits of a curved sender end here: 4⁴ pieces.
 const CURVED_DEPTH: u32 = 4;
 
@@ -93,8 +93,7 @@ pub fn point_to_sphere(x: Vec3, n: Vec3, center: Vec3, radius: f32) -> f32 {
     ((value / PI).clamp(0.0, 1.0)) as f32
 }
 
-/// Point kernel cos θ cos θ' A / (π d² + A): that of a disk of area A seen along its axis, bounded by 1 also
-/// where sender and receiver touch.
+/// Point kernel cos θ cos θ' A / (π d²), bounded by cos θ: also where sender and receiver touch it stays below 1.
 fn kernel(x: Vec3, n: Vec3, point: Vec3, normal: Vec3, area: f32) -> f32 {
     let to = point - x;
     let d2 = to.length_squared();
@@ -105,7 +104,8 @@ fn kernel(x: Vec3, n: Vec3, point: Vec3, normal: Vec3, area: f32) -> f32 {
     if cos_x <= 0.0 || cos_p <= 0.0 {
         return 0.0;
     }
-    cos_x * cos_p / d2 * area / (std::f32::consts::PI * d2 + area)
+    let cosines = cos_x * cos_p / d2;
+    (cosines * area / (std::f32::consts::PI * d2)).min(cos_x / d2.sqrt())
 }
 
 /// Corners of a domain of a flat polygon, counter-clockwise seen from the front of the given side.

@@ -3,7 +3,7 @@
 use crate::error::SolveError;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
-use crate::hooks::{Hierarchy, LightField, NodeId, Transfer};
+use crate::hooks::{Arrived, Hierarchy, LightField, NodeId, Transfer};
 use crate::links::Links;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::stats::Stats;
@@ -12,6 +12,7 @@ use crate::visibility::Visibility;
 use crate::{LightKind, Rgb, SceneInput};
 use glam::Vec3;
 use rayon::prelude::*;
+use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -22,8 +23,28 @@ const LINK_SHARE: f32 = 0.05;
 const SMALLEST_SHARE: f32 = 0.008;
 /// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
 const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
+/// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
+/// diffuse light until it is shown.
+const FAINT_SHARE: f32 = 0.5;
+/// A leaf's light is reflected anew once its irradiance has changed by this share of the error asked for.
+const REFLECT_SHARE: f32 = 0.5;
+/// Iterations end when all that are to come would change the solution by less than this share of the error.
+const CONVERGED_SHARE: f32 = 0.02;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
+
+/// What a leaf's own place makes of the light that was pushed down to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Placed {
+    /// Factor for light that its ancestors received.
+    inherited: f32,
+    /// Factor for all light: below 1 where form factors would sum to more than 1.
+    limit: f32,
+}
+
+impl Placed {
+    const UNKNOWN: Self = Self { inherited: 1.0, limit: 1.0 };
+}
 
 /// What is asked of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,8 +103,11 @@ pub struct Solver<L: LightField = ()> {
     own: Vec<Rgb>,
     /// Light through a node's own links, on nodes that are not flat.
     transfers: Vec<Vec<Transfer>>,
-    /// What each leaf's own place makes of the light that its ancestors' links carry, as a factor.
-    placed: Vec<f32>,
+    /// By node, for leaves: see [`Placed`].
+    placed: Vec<Placed>,
+    /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
+    /// diffuse light.
+    faint: Vec<Rgb>,
     /// Irradiance of each leaf when its light was last reflected by the extension.
     last_reflected: Vec<Rgb>,
     /// Area whose light counts.
@@ -102,6 +126,11 @@ impl<L: LightField> Solver<L> {
             return Err(SolveError::Error { error: settings.error });
         }
         let scene = scene_data(input)?;
+        let faint = (0..scene.materials.len() as u32).map(|material| match field.active(material) {
+            Some(albedo) if albedo.max_element() <= FAINT_SHARE * settings.error => albedo,
+            _ => Rgb::ZERO,
+        });
+        let faint: Vec<Rgb> = faint.collect();
         let elements = Elements::build(&scene, |material| field.active(material));
         let count = elements.nodes.len();
         let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
@@ -114,6 +143,7 @@ impl<L: LightField> Solver<L> {
                 direction: vec![Vec3::ZERO; count],
                 irradiance: vec![Rgb::ZERO; count],
                 reflected_as: (0..count as u32).collect(),
+                peak: vec![0.0; count],
             },
             links: Links::default(),
             field,
@@ -125,6 +155,7 @@ impl<L: LightField> Solver<L> {
             own: Vec::new(),
             transfers: Vec::new(),
             placed: Vec::new(),
+            faint,
             last_reflected: Vec::new(),
             area,
         };
@@ -137,14 +168,14 @@ impl<L: LightField> Solver<L> {
     /// refining any more.
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
-        for (pass, looseness) in PASSES.iter().chain(std::iter::repeat(&1.0)).enumerate().take(2 * PASSES.len()) {
+        for (pass, looseness) in PASSES.iter().chain(std::iter::repeat(&1.0)).enumerate().take(PASSES.len() + 1) {
             let last = pass + 1 >= PASSES.len();
             let changed = self.refine(pass, *looseness, &mut stopped, watch);
-            let goal = if last || stopped { 0.1 * self.settings.error } else { self.settings.error };
+            let goal = if last || stopped { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
             let most = if last || stopped { MOST_ITERATIONS } else { 3 };
             for iteration in 0..most {
-                // Once the light is there, and once more when it has spread.
-                if iteration == 1 || iteration == 6 {
+                // Once the light is there, and what is linked is nearly fine enough.
+                if iteration == 1 && pass + 2 >= PASSES.len() {
                     self.place();
                 }
                 let residual = self.iterate();
@@ -187,6 +218,7 @@ impl<L: LightField> Solver<L> {
             exitant: &mut self.exitant,
             field: &self.field,
             reflected: &mut self.reflected,
+            faint: &self.faint,
         };
         let mut wave_number = 0.0_f32;
         let refined = refine(&mut light, links, unlit, tolerance, &mut |wave, done| {
@@ -218,8 +250,8 @@ impl<L: LightField> Solver<L> {
         self.gather();
         self.push();
         let middle = Instant::now();
-        self.reflect();
-        self.pull_reflected();
+        let changed = self.reflect(false);
+        self.pull_reflected(&changed);
         let end = Instant::now();
         self.pull();
         self.stats.seconds.transport += (middle - start).as_secs_f64() + end.elapsed().as_secs_f64();
@@ -237,6 +269,15 @@ impl<L: LightField> Solver<L> {
         self.stats.iterations += 1;
         self.stats.residuals.push(residual);
         residual
+    }
+
+    /// Reflects the incident light of all leaves once more, of those too whose glossy part was carried as diffuse
+    /// light: the final reflection of all accumulated samples (paper, section 3.4), for display by distributions.
+    pub fn reflect_for_display(&mut self) {
+        let start = Instant::now();
+        let changed = self.reflect(true);
+        self.pull_reflected(&changed);
+        self.stats.seconds.reflect += start.elapsed().as_secs_f64();
     }
 
     /// Read access to hierarchy and exitant light.
@@ -304,10 +345,14 @@ impl<L: LightField> Solver<L> {
             .with_min_len(64)
             .map(|&leaf| {
                 let element = light.element(leaf);
+                let placed = self.placed.get(leaf as usize).copied().unwrap_or(Placed::UNKNOWN);
+                // Its own links are averages over the leaf already.
                 let mut sum = Rgb::ZERO;
                 let mut node = leaf;
                 loop {
-                    sum += self.own[node as usize];
+                    if node != leaf {
+                        sum += self.own[node as usize];
+                    }
                     for transfer in &self.transfers[node as usize] {
                         let (direction, scale) = renewed(light, transfer, element.center, node);
                         sum += transfer.irradiance * (element.mean_cosine(direction) * scale);
@@ -317,39 +362,49 @@ impl<L: LightField> Solver<L> {
                     }
                     node = elements.nodes[node as usize].parent;
                 }
-                sum
+                (self.own[leaf as usize] + sum * placed.inherited) * placed.limit
             })
             .collect();
-        self.placed.resize(elements.nodes.len(), 1.0);
         for (leaf, sum) in leaves.into_iter().zip(sums) {
-            self.exitant.irradiance[leaf as usize] = sum * self.placed[leaf as usize];
+            self.exitant.irradiance[leaf as usize] = sum;
         }
     }
 
     /// Form factors are means over the element that a link ends at; a leaf in a corner of it sees more or less.
     /// Compares the light that arrives at each leaf's middle with what was pushed down to it. In an enclosure
-    /// this makes every leaf's form factors sum to 1, whichever ancestors hold its links.
+    /// this makes every leaf's form factors sum to 1, whichever ancestors hold its links; nowhere do they sum to more,
+    /// so that light dies out wherever reflectances are below 1.
     fn place(&mut self) {
         let start = Instant::now();
         let (elements, light) = (&self.elements, self.light());
         let leaves: Vec<u32> = elements.patch_leaves().collect();
-        let factors: Vec<f32> = leaves
+        let factors: Vec<Placed> = leaves
             .par_iter()
             .with_min_len(16)
             .map(|&leaf| {
                 let element = light.element(leaf);
-                let normal = element.mean_normal.normalize_or_zero();
-                if !element.is_flat() || normal == Vec3::ZERO {
-                    return 1.0;
-                }
-                let (mut exact, mut pushed) = (0.0, 0.0);
+                let points = sample_points(&self.scene, element);
+                let (mut exact, mut pushed, mut row) = (0.0, 0.0, 0.0);
                 let mut node = leaf;
                 loop {
                     let receiver = light.element(node);
                     for link in self.links.of(node) {
                         let visible = link.visibility.abs();
-                        if visible > 0.0 {
-                            exact += visible * light.irradiance_at(element.center, normal, link.sender).element_sum();
+                        if visible > 0.0 && node == leaf && receiver.is_flat() {
+                            let sender = light.element(link.sender);
+                            let away = -light.direction_to(receiver.center, link.sender);
+                            row += visible
+                                * link.factor
+                                * match sender.kind {
+                                    Kind::Light => 0.0,
+                                    Kind::Cluster => sender.mean_cosine(away),
+                                    Kind::Front | Kind::Back => 1.0,
+                                };
+                        } else if visible > 0.0 {
+                            for &(x, n, weight) in &points {
+                                exact += visible * weight * light.irradiance_at(x, n, link.sender).element_sum();
+                                row += visible * weight * light.share_at(x, n, link.sender);
+                            }
                             let direction = light.direction_to(receiver.center, link.sender);
                             let carried = light.emitted(link.sender, -direction).element_sum() * link.factor * visible;
                             pushed += if receiver.is_flat() {
@@ -371,11 +426,13 @@ impl<L: LightField> Solver<L> {
                     }
                     node = receiver.parent;
                 }
-                if pushed > 0.0 && exact > 0.0 { (exact / pushed).clamp(0.25, 4.0) } else { 1.0 }
+                // Surfaces that lie in one another's plane hide each other by turns, which no ray can tell.
+                let inherited = if pushed > 0.0 && exact > 0.0 { (exact / pushed).clamp(0.25, 4.0) } else { 1.0 };
+                Placed { inherited, limit: row.max(1.0).recip() }
             })
             .collect();
         self.placed.clear();
-        self.placed.resize(elements.nodes.len(), 1.0);
+        self.placed.resize(elements.nodes.len(), Placed::UNKNOWN);
         for (leaf, factor) in leaves.into_iter().zip(factors) {
             self.placed[leaf as usize] = factor;
         }
@@ -383,14 +440,19 @@ impl<L: LightField> Solver<L> {
     }
 
     /// The extension turns the incident light of its leaves into exitant light.
-    fn reflect(&mut self) {
+    /// Tells which leaves changed.
+    fn reflect(&mut self, faint_too: bool) -> Vec<u32> {
         let elements = &self.elements;
         if !elements.nodes[0].active {
-            return;
+            return Vec::new();
         }
-        let tolerance = 0.1 * self.settings.error;
+        let tolerance = REFLECT_SHARE * self.settings.error;
         self.last_reflected.resize(elements.nodes.len(), Rgb::splat(f32::NEG_INFINITY));
-        let leaves: Vec<u32> = elements.patch_leaves().filter(|&l| elements.nodes[l as usize].active).collect();
+        let strong = |leaf: &u32| {
+            let element = &elements.nodes[*leaf as usize];
+            element.active && (faint_too || self.faint[element.material as usize] == Rgb::ZERO)
+        };
+        let leaves: Vec<u32> = elements.patch_leaves().filter(strong).collect();
         let all = leaves.len() as u64;
         let leaves: Vec<u32> = leaves
             .into_iter()
@@ -412,32 +474,39 @@ impl<L: LightField> Solver<L> {
                 }
                 path.reverse();
                 let element = &elements.nodes[leaf as usize];
-                let diffuse = self.exitant.irradiance[leaf as usize] * element.reflectance / std::f32::consts::PI;
-                self.field.reflect(elements, NodeId(leaf), &path, diffuse)
+                let irradiance = self.exitant.irradiance[leaf as usize];
+                let diffuse = irradiance * element.reflectance * std::f32::consts::FRAC_1_PI;
+                self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse })
             })
             .collect();
-        for (leaf, exitant) in leaves.into_iter().zip(exitant) {
+        for (&leaf, exitant) in leaves.iter().zip(exitant) {
             self.reflected[leaf as usize] = exitant;
             self.last_reflected[leaf as usize] = self.exitant.irradiance[leaf as usize];
         }
+        leaves
     }
 
-    /// The extension averages its exitant light bottom-up, all nodes of one height in parallel.
-    fn pull_reflected(&mut self) {
+    /// The extension averages its exitant light bottom-up, all nodes of one height in parallel. Only what is above
+    /// the leaves that changed is averaged anew.
+    fn pull_reflected(&mut self, changed: &[u32]) {
         let elements = &self.elements;
-        if !elements.nodes[0].active {
-            return;
-        }
         let count = elements.nodes.len();
         let mut height = vec![0_u32; count];
+        let mut stale = vec![false; count];
+        for &leaf in changed {
+            stale[leaf as usize] = true;
+        }
         let mut layers: Vec<Vec<u32>> = Vec::new();
         for node in (0..count).rev() {
             let element = &elements.nodes[node];
             let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
             if let Some(tallest) = height[range].iter().copied().max() {
                 height[node] = tallest + 1;
-                if element.active {
-                    let layer = tallest as usize;
+            }
+            if stale[node] {
+                stale[element.parent as usize] = true;
+                if element.child_count > 0 {
+                    let layer = height[node] as usize - 1;
                     layers.resize_with(layers.len().max(layer + 1), Vec::new);
                     layers[layer].push(node as u32);
                 }
@@ -459,6 +528,14 @@ impl<L: LightField> Solver<L> {
         for (node, source) in self.exitant.reflected_as.iter_mut().enumerate() {
             *source = node as u32;
         }
+        let (field, reflected) = (&self.field, &self.reflected);
+        let nodes = self.exitant.peak.par_iter_mut().zip(reflected).zip(&stale);
+        nodes.for_each(|((peak, light), &stale)| {
+            if stale {
+                let (low, high) = field.radiance_bounds(light, &crate::Cone::SPHERE);
+                *peak = high.max(-low).max_element().max(0.0);
+            }
+        });
     }
 
     /// Diffuse radiosity of the leaves, averaged bottom-up with its range and direction.
@@ -472,7 +549,8 @@ impl<L: LightField> Solver<L> {
             if element.child_count == 0 {
                 let material = &self.scene.materials[element.material as usize];
                 let emitted = if element.kind == Kind::Front { material.exitance } else { Rgb::ZERO };
-                let radiosity = emitted + exitant.irradiance[node] * element.reflectance;
+                let reflectance = element.reflectance + self.faint[element.material as usize];
+                let radiosity = emitted + exitant.irradiance[node] * reflectance;
                 exitant.radiosity[node] = radiosity;
                 exitant.range[node] = [radiosity, radiosity];
                 exitant.direction[node] = element.mean_normal;
@@ -563,6 +641,17 @@ pub(crate) fn renewed<L: LightField>(light: Light<'_, L>, transfer: &Transfer, a
     let now = at.distance_squared(sender.center);
     // Near large senders the inverse square law ends; a factor of four is more than refinement leaves.
     (direction, (before / now.max(1e-12)).clamp(0.25, 4.0))
+}
+
+/// Points, normals and weights (sum 1) that stand for a leaf: its middle where it is flat, four of a curved one.
+fn sample_points(scene: &SceneData, element: &crate::hierarchy::Element) -> SmallVec<[(Vec3, Vec3, f32); 4]> {
+    if element.is_flat() {
+        return smallvec![(element.center, element.normals.axis, 1.0)];
+    }
+    let geometry = &scene.surfaces()[element.source as usize];
+    let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
+    let points = geometry.quadrature(element.domain);
+    points.into_iter().map(|(uv, weight)| (geometry.point(uv), geometry.normal(uv) * side, weight)).collect()
 }
 
 /// Share of the work done: each pass costs a few times the one before.
