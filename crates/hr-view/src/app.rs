@@ -1,30 +1,41 @@
 //! The program: load, solve, show.
 
-use crate::args::Args;
-use crate::display::Walkable;
+use crate::ViewError;
+use crate::args::{self, Args};
+use crate::interrupt::Interrupt;
 use crate::progress::Progress;
+use crate::raycast::{Mode, RayCaster};
+use crate::solved::Solved;
+use crate::stats::{Times, stats};
+use crate::walkthrough::Walkthrough;
 use crate::window::{self, WindowError, WindowOptions};
-use crate::{Mode, ViewError};
+use hr_diffuse::{Phase, Settings};
 use hr_scene::whole_file::write_whole;
-use hr_scene::{Camera, Exposure, Image, ImageKind, Scene, SceneError, ToneMap};
+use hr_scene::{Camera, Exposure, ImageKind, Rgb, Scene, SceneError, ToneMap};
 use std::io::Write;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
-/// Frames of the walkthrough: eight seconds at 30 frames a second.
-const FRAMES: usize = 240;
+/// Frames of the walkthrough.
+const FRAMES: usize = 60;
+/// Size of frames, unless a camera of the command line has another one.
+const FRAME_SIZE: [u32; 2] = [640, 400];
+/// Rays per pixel of frames, squared.
+const FRAME_GRID: u32 = 2;
+/// Frames share one exposure: that of so many small pictures along the way, this wide and high.
+const METERED: usize = 12;
+const METER_SIZE: [u32; 2] = [64, 40];
 
 /// Where frames go when there is no window and nobody said where.
 const FALLBACK_FRAMES: &str = "hr-view-frames";
 
-/// A solved scene: to walk through, and to take pictures of.
-pub trait Shown: Walkable {
-    /// Linear radiance as a camera sees it. `watch` is told the share that is done, from any thread.
-    fn image(&self, camera: &Camera, mode: Mode, watch: &(dyn Fn(f32) + Sync)) -> Image;
+/// So many warnings about the scene are told; of the others, how many there are.
+const MOST_WARNINGS: usize = 8;
 
-    /// What `--stats` writes, `display` being the seconds that showing took.
-    fn stats(&self, display: f64) -> serde_json::Value;
-}
+/// Values at vertices after a solve that was stopped may take this much longer than the solve took, and a second.
+const PATIENCE: f64 = 0.5;
 
 /// How a solution is to be shown.
 enum Output {
@@ -36,12 +47,44 @@ enum Output {
 impl Output {
     /// What the command line asks for; refuses what could not be written before anything is computed.
     fn of(args: &Args) -> Result<Self, ViewError> {
+        args.stats.as_deref().map_or(Ok(()), has_folder)?;
         if let Some(path) = &args.image {
             ImageKind::of(path)?;
+            has_folder(path)?;
             return Ok(Self::Image(path.clone()));
         }
-        Ok(args.frames.clone().map_or(Self::Window, Self::Frames))
+        if let Some(folder) = &args.frames {
+            make_folder(folder)?;
+            return Ok(Self::Frames(folder.clone()));
+        }
+        Ok(Self::Window)
     }
+}
+
+/// Whether the folder that a file is to be written to is there.
+fn has_folder(path: &Path) -> Result<(), SceneError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let is_folder = std::fs::metadata(folder).map_or_else(Err, |found| {
+        if found.is_dir() { Ok(()) } else { Err(std::io::ErrorKind::NotADirectory.into()) }
+    });
+    is_folder.map_err(|source| SceneError::Io { path: path.to_path_buf(), source })
+}
+
+fn make_folder(folder: &Path) -> Result<(), SceneError> {
+    std::fs::create_dir_all(folder).map_err(|source| SceneError::Io { path: folder.to_path_buf(), source })
+}
+
+/// What there is to show, and how.
+struct Show<'a> {
+    args: &'a Args,
+    mode: Mode,
+    solved: Solved,
+    /// Relative error that the solution is believed to have.
+    error: f32,
+    progress: &'a Progress,
+    /// Time that loading took, and when showing began.
+    loaded: Duration,
+    begin: Duration,
 }
 
 /// Does what the command line says.
@@ -50,34 +93,41 @@ impl Output {
 /// Anything that keeps it from being done; the text is one line for the user.
 pub fn run(args: &Args) -> Result<(), ViewError> {
     let output = Output::of(args)?;
+    let mode = match args.mode {
+        args::Mode::Distributions => Mode::Distributions,
+        args::Mode::Samples => Mode::Samples,
+        args::Mode::Gather => return Err(ViewError::Arguments(args::GATHER_IS_MISSING.into())),
+    };
     let progress = Progress::new();
     if let Some(threads) = args.threads {
+        // For all of the process: the window's thread cannot be one of a pool of its own.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
         pool.map_err(|error| ViewError::Arguments(format!("--threads {threads}: {error}; ask for fewer")))?;
     }
     let scene = load(args, &progress)?;
-    let solved = solve(&scene, args, &progress)?;
+    let loaded = progress.elapsed();
+    let (solved, error) = solve(scene, args, &progress)?;
     let begin = progress.elapsed();
-    show(solved.as_ref(), &scene, args, &output, &progress)?;
-    if let Some(path) = &args.stats {
-        let stats = solved.stats((progress.elapsed() - begin).as_secs_f64());
-        write_whole(path, |out| {
-            serde_json::to_writer_pretty(&mut *out, &stats)?;
-            writeln!(out)
-        })?;
+    let show = Show { args, mode, solved, error, progress: &progress, loaded, begin };
+    match output {
+        Output::Window => show.window(),
+        Output::Image(path) => show.image(&path),
+        Output::Frames(folder) => show.frames(&folder),
     }
-    Ok(())
 }
 
 /// The scene, with the camera of the command line first.
 fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
-    progress.at(&format!("loading {}", args.scene), 0.0, None);
+    progress.at(&format!("loading {}", args.scene), 0.0);
     // The camera first: it is read at once, and a mistake in it shows before the wait for a large scene.
     let camera = args.camera.as_deref().map(Camera::load).transpose()?;
     let mut scene = Scene::load(&args.scene)?;
-    for warning in &scene.warnings {
+    for warning in scene.warnings.iter().take(MOST_WARNINGS) {
         let times = if warning.count > 1 { format!(", {} times", warning.count) } else { String::new() };
         progress.say(&format!("warning: {} ({}{times})", warning.text, warning.first));
+    }
+    if let Some(more) = scene.warnings.len().checked_sub(MOST_WARNINGS).filter(|more| *more > 0) {
+        progress.say(&format!("warning: {more} more kinds of warnings"));
     }
     if let Some(camera) = camera {
         scene.cameras.insert(0, ("--camera".to_owned(), camera));
@@ -87,48 +137,100 @@ fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
     Ok(Arc::new(scene))
 }
 
-/// Solves for the light to the accuracy asked for, or until the time is up.
-fn solve(_scene: &Arc<Scene>, _args: &Args, _progress: &Progress) -> Result<Box<dyn Shown>, ViewError> {
-    Err(ViewError::Arguments("this build cannot solve scenes; build hr-view with its solver".into()))
-}
-
-/// Shows a solution as asked, or as frames where no window can be opened.
-fn show(solved: &dyn Shown, scene: &Scene, args: &Args, output: &Output, progress: &Progress) -> Result<(), ViewError> {
-    match output {
-        Output::Image(path) => image(solved, scene, args.mode, path, progress),
-        Output::Frames(folder) => frames(solved, scene, args.mode, folder, progress),
-        Output::Window => {
-            progress.clear();
-            match window::open(solved, &WindowOptions::default()) {
-                Ok(()) => Ok(()),
-                Err(error @ (WindowError::NoDisplay(_) | WindowError::NoAdapter(_))) => {
-                    progress.say(&format!("{error}; writing frames to {FALLBACK_FRAMES} instead"));
-                    frames(solved, scene, args.mode, Path::new(FALLBACK_FRAMES), progress)
-                }
-                Err(error) => Err(error.into()),
+/// Solves for the light to the accuracy asked for, or until the time is up or the user has seen enough. Also tells
+/// the relative error that the solution is believed to have.
+fn solve(scene: Arc<Scene>, args: &Args, progress: &Progress) -> Result<(Solved, f32), ViewError> {
+    let budget = args.time_budget.map(Duration::from_secs_f64);
+    let interrupt = Interrupt::listen();
+    let (mut error, mut stopped) = (1.0, false);
+    // When values at vertices have to be done, after a solve that was stopped.
+    let mut latest = None;
+    let watch = &mut |state: &hr_diffuse::Progress| {
+        let now = progress.elapsed();
+        progress.solving(state);
+        if state.phase != Phase::Reconstruct {
+            error = state.error;
+            if interrupt.is_raised() && !stopped {
+                progress.say("stopping, this shows what there is; Ctrl-C again ends the program");
             }
+            stopped |= interrupt.is_raised() || budget.is_some_and(|budget| now >= budget);
+            return if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         }
-    }
+        let latest = *latest.get_or_insert(now.mul_f64(1.0 + PATIENCE) + Duration::from_secs(1));
+        if stopped && now >= latest { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let solved = Solved::new(scene, Settings { error: args.error }, watch)?;
+    Ok((solved, error))
 }
 
-fn image(solved: &dyn Shown, scene: &Scene, mode: Mode, path: &Path, progress: &Progress) -> Result<(), ViewError> {
-    let watch = |share| progress.at("taking the picture", share, None);
-    let image = solved.image(&scene.default_camera(), mode, &watch);
-    image.save(path, &ToneMap::default(), scene.primaries)?;
-    Ok(())
-}
-
-/// Numbered PNG files, all exposed alike: as the first one wants it.
-fn frames(solved: &dyn Shown, scene: &Scene, mode: Mode, folder: &Path, progress: &Progress) -> Result<(), ViewError> {
-    std::fs::create_dir_all(folder).map_err(|source| SceneError::Io { path: folder.to_path_buf(), source })?;
-    let mut tone_map = ToneMap::default();
-    for (number, camera) in scene.walkthrough(FRAMES).iter().enumerate() {
-        let watch = |share| progress.at("writing frames", (number as f32 + share) / FRAMES as f32, None);
-        let image = solved.image(camera, mode, &watch);
-        if number == 0 {
-            tone_map.exposure = Exposure::Factor(tone_map.factor(&image.pixels, scene.primaries));
+impl Show<'_> {
+    /// A window, or frames where none can be opened.
+    fn window(&self) -> Result<(), ViewError> {
+        self.progress.at("making triangles", 0.0);
+        let walkthrough = Walkthrough::new(&self.solved, self.mode);
+        // Before the window opens: how long somebody looks is not the program's time.
+        self.write_stats()?;
+        self.progress.clear();
+        match window::open(&walkthrough, &WindowOptions::default()) {
+            Ok(()) => Ok(()),
+            Err(error @ (WindowError::NoDisplay(_) | WindowError::NoAdapter(_))) => {
+                self.progress.say(&format!("{error}; writing frames to {FALLBACK_FRAMES} instead"));
+                self.frames(Path::new(FALLBACK_FRAMES))
+            }
+            Err(error) => Err(error.into()),
         }
-        image.save(&folder.join(format!("frame-{number:04}.png")), &tone_map, scene.primaries)?;
     }
-    Ok(())
+
+    fn image(&self, path: &Path) -> Result<(), ViewError> {
+        let scene = &self.solved.scene;
+        let watch = |share| self.progress.at("taking the picture", share);
+        let image = self.caster().render(&scene.default_camera(), &watch);
+        image.save(path, &ToneMap::default(), scene.primaries)?;
+        self.write_stats()
+    }
+
+    /// Numbered PNG files, all exposed alike.
+    fn frames(&self, folder: &Path) -> Result<(), ViewError> {
+        make_folder(folder)?;
+        let scene = &self.solved.scene;
+        let caster = self.caster().with_grid(FRAME_GRID);
+        let resized = |mut camera: Camera, size: [u32; 2]| {
+            [camera.width, camera.height] = size;
+            camera
+        };
+        let meter = self.caster().with_grid(1);
+        let metered: Vec<Rgb> = scene
+            .walkthrough(METERED)
+            .into_iter()
+            .flat_map(|camera| meter.render(&resized(camera, METER_SIZE), &|_| ()).pixels)
+            .collect();
+        let exposure = Exposure::Factor(ToneMap::default().factor(&metered, scene.primaries));
+        let tone_map = ToneMap { exposure, ..ToneMap::default() };
+        for (number, camera) in scene.walkthrough(FRAMES).into_iter().enumerate() {
+            let watch = |share| self.progress.at("writing frames", (number as f32 + share) / FRAMES as f32);
+            let camera = if self.args.camera.is_some() { camera } else { resized(camera, FRAME_SIZE) };
+            let image = caster.render(&camera, &watch);
+            image.save(&folder.join(format!("frame-{number:04}.png")), &tone_map, scene.primaries)?;
+        }
+        self.progress.say(&format!("{FRAMES} frames written to {}", folder.display()));
+        self.write_stats()
+    }
+
+    fn caster(&self) -> RayCaster<'_> {
+        RayCaster::new(&self.solved.scene, &self.solved.solution, self.mode)
+    }
+
+    /// What `--stats` asks for, up to now.
+    fn write_stats(&self) -> Result<(), ViewError> {
+        let Some(path) = &self.args.stats else { return Ok(()) };
+        let now = self.progress.elapsed();
+        let times =
+            Times { load: self.loaded.as_secs_f64(), show: (now - self.begin).as_secs_f64(), total: now.as_secs_f64() };
+        let stats = stats(&self.solved, self.args.error, self.error, &times);
+        write_whole(path, |out| {
+            serde_json::to_writer_pretty(&mut *out, &stats)?;
+            writeln!(out)
+        })?;
+        Ok(())
+    }
 }

@@ -29,7 +29,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR", conflicts_with = "image")]
     pub frames: Option<PathBuf>,
 
-    /// How glossy light comes into images and frames
+    /// How glossy light is shown
     #[arg(long, value_name = "M", value_enum, default_value_t)]
     pub mode: Mode,
 
@@ -62,17 +62,21 @@ pub struct Args {
     pub html: Option<PathBuf>,
 }
 
-/// How glossy light comes into images and frames; the window always evaluates distributions.
+/// How glossy light comes into images, frames and the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
     /// evaluate the outgoing distributions (the paper's walkthrough)
     #[default]
     Distributions,
-    /// reflect the incident samples at each pixel
+    /// reflect the incident samples at each pixel (in the window: at each vertex)
     Samples,
-    /// final gather at each pixel, for stills
+    /// final gather at each pixel, for stills (not available yet)
     Gather,
 }
+
+/// What is said to `--mode gather`.
+pub(crate) const GATHER_IS_MISSING: &str =
+    "--mode gather is not available yet; use --mode samples or --mode distributions";
 
 /// What came of reading the command line.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,6 +103,9 @@ impl Args {
         let later = [("--save", &args.save), ("--load", &args.load), ("--html", &args.html)];
         if let Some((option, _)) = later.iter().find(|(_, value)| value.is_some()) {
             return Err(ViewError::Arguments(format!("{option} is not available yet; use --image or --frames")));
+        }
+        if args.mode == Mode::Gather {
+            return Err(ViewError::Arguments(GATHER_IS_MISSING.into()));
         }
         Ok(Parsed::Run(Box::new(args)))
     }
@@ -161,12 +168,12 @@ mod tests {
         let nothing = run("");
         assert_eq!(nothing.scene, hr_scene::builtin::DEFAULT, "no scene is the default scene");
         assert_eq!(nothing.mode, Mode::Distributions, "the paper's mode is the default");
-        let all = run("a.mgf --camera c.json --image o.exr --mode gather --error 0.02 --time-budget 10 --threads 3 \
+        let all = run("a.mgf --camera c.json --image o.exr --mode samples --error 0.02 --time-budget 10 --threads 3 \
              --stats s.json");
         assert_eq!(all.scene, "a.mgf", "scene");
         assert_eq!(all.camera, Some("c.json".into()), "camera");
         assert_eq!(all.image, Some("o.exr".into()), "image");
-        assert_eq!(all.mode, Mode::Gather, "mode");
+        assert_eq!(all.mode, Mode::Samples, "mode");
         assert_eq!((all.error, all.time_budget, all.threads), (0.02, Some(10.0), Some(3)), "numbers");
         assert_eq!(all.stats, Some("s.json".into()), "stats");
         assert_eq!(run("--frames out").frames, Some("out".into()), "frames");
@@ -188,6 +195,7 @@ mod tests {
             ("--image", "--image"),
             ("--image a.png --frames b", "--frames"),
             ("a.mgf b.mgf", "b.mgf"),
+            ("--mode gather", "not available yet"),
             ("--save x", "not available yet"),
             ("--load x", "not available yet"),
             ("--html x", "not available yet"),

@@ -4,9 +4,14 @@ pub mod app;
 pub mod args;
 pub mod display;
 pub mod error;
+pub mod facets;
+pub mod glossy;
+pub mod interrupt;
 pub mod progress;
 pub mod raycast;
 pub mod solved;
+pub mod stats;
+pub mod walkthrough;
 pub mod window;
 
 pub use args::{Args, Mode, Parsed};
@@ -15,6 +20,16 @@ pub use error::ViewError;
 use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
+
+/// The program with the process's own command line. A fault of ours is an error like any other to the user: one line
+/// and status 1.
+pub fn main() -> ExitCode {
+    std::panic::set_hook(Box::new(|fault| {
+        let text = one_line(&fault.to_string());
+        drop(writeln!(std::io::stderr(), "hr-view: internal error, please report it with the scene: {text}"));
+    }));
+    std::panic::catch_unwind(|| main_with(std::env::args_os())).unwrap_or(ExitCode::FAILURE)
+}
 
 /// The program: reads the command line, does what it says, and ends with status 0, or with 1 and one line on standard
 /// error.

@@ -1,5 +1,6 @@
 //! What the program is doing, how far it is, and how good the solution is: a bar on a terminal, else a few lines.
 
+use hr_diffuse::Phase;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
@@ -43,7 +44,7 @@ impl Progress {
             return Self::lines(Box::new(std::io::stderr()), WORTH_A_LINE);
         }
         let bar = ProgressBar::new(STEPS);
-        let template = "{msg:46!} {bar:24} {percent:>3} %  {elapsed}";
+        let template = "{msg:58!} {bar:24} {percent:>3} %  {elapsed}";
         bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.enable_steady_tick(TICK);
         Self { to: To::Bar(bar), begin: Instant::now() }
@@ -55,18 +56,30 @@ impl Progress {
         Self { to: To::Lines(Mutex::new(lines)), begin }
     }
 
-    /// Says what is being done and how far it is (0…1), and, where known, the relative error that the solution is
-    /// believed to have. May be called often and from any thread.
-    pub fn at(&self, activity: &str, fraction: f32, error: Option<f32>) {
+    /// Says how far a solve is: links, and the relative error that the solution is believed to have.
+    pub fn solving(&self, state: &hr_diffuse::Progress) {
+        let activity = match state.phase {
+            Phase::Refine => "refining links",
+            Phase::Transport => "transporting light",
+            Phase::Reconstruct => "values at vertices",
+            _ => "solving",
+        };
+        let detail = || format!(": {}, error about {:.2} %", links(state.links), 100.0 * state.error);
+        self.tell(activity, state.fraction, detail);
+    }
+
+    /// Says what is being done and how far it is (0…1). May be called often and from any thread.
+    pub fn at(&self, activity: &str, fraction: f32) {
+        self.tell(activity, fraction, String::new);
+    }
+
+    fn tell(&self, activity: &str, fraction: f32, detail: impl FnOnce() -> String) {
         match &self.to {
             To::Bar(bar) => {
                 // Saturates; not-a-number is 0.
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0…STEPS")]
                 bar.set_position((fraction.clamp(0.0, 1.0) * STEPS as f32) as u64);
-                bar.set_message(match error {
-                    Some(error) => format!("{activity}, error about {:.1} %", 100.0 * error),
-                    None => activity.to_owned(),
-                });
+                bar.set_message(format!("{activity}{}", detail()));
             }
             To::Lines(lines) => {
                 let lines = &mut *lines.lock().unwrap_or_else(PoisonError::into_inner);
@@ -116,6 +129,15 @@ impl Drop for Progress {
     }
 }
 
+/// A number of links, short.
+fn links(count: u64) -> String {
+    match count {
+        0..10_000 => format!("{count} links"),
+        10_000..1_000_000 => format!("{} k links", count / 1000),
+        _ => format!("{:.1} M links", count as f64 * 1e-6),
+    }
+}
+
 /// Nobody may be listening; that is no reason to stop.
 fn write(out: &mut impl Write, text: &str) {
     drop(writeln!(out, "hr-view: {text}"));
@@ -143,11 +165,11 @@ mod tests {
         let out = Shared::default();
         let progress = Progress::lines(Box::new(out.clone()), Duration::ZERO);
         for i in 0..100_u8 {
-            progress.at("refining", f32::from(i) / 100.0, Some(0.1));
+            progress.at("refining", f32::from(i) / 100.0);
         }
         progress.say("one warning");
-        progress.at("refining", 0.9, None);
-        progress.at("transport", f32::NAN, None);
+        progress.at("refining", 0.9);
+        progress.at("transport", f32::NAN);
         progress.clear();
         let text = String::from_utf8(out.0.lock().unwrap_or_else(PoisonError::into_inner).clone());
         let expected = "hr-view: refining\nhr-view: one warning\nhr-view: transport\n";
@@ -158,8 +180,8 @@ mod tests {
     fn what_is_over_soon_is_not_mentioned() {
         let out = Shared::default();
         let progress = Progress::lines(Box::new(out.clone()), Duration::from_secs(3600));
-        progress.at("loading", 0.0, None);
-        progress.at("refining", 0.5, None);
+        progress.at("loading", 0.0);
+        progress.at("refining", 0.5);
         assert!(out.0.lock().unwrap_or_else(PoisonError::into_inner).is_empty(), "an hour has not passed");
     }
 }

@@ -1,25 +1,35 @@
 //! The command as the shell sees it: mistakes are status 1 and one line.
 
+use std::path::PathBuf;
 use std::process::{Command, Output};
+use std::time::Instant;
 
 fn hr_view(arguments: &[&str]) -> Output {
+    command(arguments).output().expect("the command runs")
+}
+
+/// The command without any screen.
+fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_hr-view"));
     command.args(arguments);
     for name in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
         command.env_remove(name);
     }
-    command.output().expect("the command runs")
+    command
 }
 
 #[test]
 fn mistakes_are_status_1_and_one_line() {
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 9] = [
         (&["no-such-scene"], "room"),
         (&["no-such-file.mgf"], "no-such-file.mgf"),
         (&["--camera", "no-such-camera.json"], "no-such-camera.json"),
         (&["--image", "picture.gif"], ".png"),
         (&["--error", "2"], "0.001"),
         (&["--html", "a.html"], "not available yet"),
+        (&["--mode", "gather", "--image", "a.png"], "not available yet"),
+        (&["furnace", "--image", "no/such/folder/a.png"], "no/such/folder/a.png"),
+        (&["furnace", "--error", "0.9", "--frames", "/dev/null/frames"], "/dev/null/frames"),
     ];
     for (arguments, hint) in cases {
         let output = hr_view(arguments);
@@ -36,4 +46,160 @@ fn help_goes_to_standard_output() {
     assert_eq!(output.status.code(), Some(0), "help is no mistake");
     assert!(String::from_utf8_lossy(&output.stdout).contains("--time-budget"), "all options are listed");
     assert!(output.stderr.is_empty(), "nothing is wrong");
+}
+
+/// A folder of its own for a test's files, removed at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("hr-view-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).expect("the folder for temporary files can be written to");
+        Self(path)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).display().to_string()
+    }
+
+    fn write(&self, name: &str, text: &str) -> String {
+        std::fs::write(self.path(name), text).expect("the folder is ours");
+        self.path(name)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        drop(std::fs::remove_dir_all(&self.0));
+    }
+}
+
+/// Runs a command line that is to succeed without a word on standard output.
+fn succeeds(arguments: &[&str]) -> String {
+    let output = hr_view(arguments);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {text}");
+    assert!(output.stdout.is_empty(), "{arguments:?}: results are files");
+    text
+}
+
+/// Width, height and channels of a little-endian colour PFM file, rows from the bottom up.
+fn read_pfm(path: &str) -> (usize, usize, Vec<f32>) {
+    let bytes = std::fs::read(path).expect("the picture was written");
+    let header = bytes.splitn(4, |b| *b == b'\n').take(3).map(|line| String::from_utf8_lossy(line).into_owned());
+    let header: Vec<String> = header.collect();
+    assert_eq!((header[0].as_str(), header[2].as_str()), ("PF", "-1.0"), "a colour PFM file");
+    let size: Vec<usize> = header[1].split(' ').map(|n| n.parse().expect("a size")).collect();
+    let data = &bytes[header.iter().map(|line| line.len() + 1).sum()..];
+    let channels = data.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    (size[0], size[1], channels)
+}
+
+/// A camera in the middle of the furnace (a cube), wider than high.
+const IN_THE_FURNACE: &str =
+    r#"{"eye":[0.4,0.5,0.6],"target":[1,0.4,0.3],"up":[0,0,1],"fov_x":80,"width":24,"height":16}"#;
+
+#[test]
+fn pictures_have_the_cameras_size_and_the_right_light() {
+    let folder = Folder::new("pictures");
+    let camera = folder.write("camera.json", IN_THE_FURNACE);
+    let scene = hr_scene::Scene::load("furnace").expect("built in");
+    let material = &scene.materials[0];
+    // Radiosity is exitance / (1 − reflectance) in a closed furnace.
+    let expected =
+        material.exitance / (hr_scene::Rgb::ONE - material.reflector.diffuse()) * std::f32::consts::FRAC_1_PI;
+    for mode in ["distributions", "samples"] {
+        let pfm = folder.path(&format!("{mode}.pfm"));
+        succeeds(&["furnace", "--error", "0.2", "--camera", &camera, "--mode", mode, "--image", &pfm]);
+        let (width, height, channels) = read_pfm(&pfm);
+        assert_eq!((width, height, channels.len()), (24, 16, 24 * 16 * 3), "{mode}: size");
+        for (i, found) in channels.iter().enumerate() {
+            let right = expected[i % 3];
+            assert!(
+                (found / right - 1.0).abs() < 0.2,
+                "{mode}: channel {i} is {found}, not {right}: error asked for 0.2"
+            );
+        }
+    }
+    for name in ["a.exr", "a.png"] {
+        let path = folder.path(name);
+        succeeds(&["furnace", "--error", "0.5", "--camera", &camera, "--image", &path]);
+        let bytes = std::fs::read(&path).expect("the picture was written");
+        let magic: &[u8] = if name.ends_with("png") { b"\x89PNG" } else { &[0x76, 0x2f, 0x31, 0x01] };
+        assert!(bytes.starts_with(magic), "{name} is what its name says");
+    }
+    let png = image::open(folder.path("a.png")).expect("a PNG file");
+    assert_eq!((png.width(), png.height()), (24, 16), "size of the PNG file");
+}
+
+#[test]
+fn glossy_light_is_finite_and_counted() {
+    let folder = Folder::new("glossy");
+    let camera = folder.write(
+        "camera.json",
+        &serde_json::to_string(&hr_scene::Camera {
+            width: 32,
+            height: 20,
+            ..hr_scene::Scene::load("three-lights").expect("built in").default_camera()
+        })
+        .expect("cameras serialise"),
+    );
+    let (pfm, json) = (folder.path("a.pfm"), folder.path("a.json"));
+    let options = ["--error", "0.5", "--threads", "2", "--camera", &camera, "--image", &pfm, "--stats", &json];
+    succeeds(&[&["three-lights"], &options[..]].concat());
+    let (width, height, channels) = read_pfm(&pfm);
+    assert_eq!((width, height), (32, 20), "size");
+    assert!(channels.iter().all(|c| c.is_finite() && *c >= 0.0), "radiance is finite and not negative");
+    assert!(channels.iter().any(|c| *c > 0.0), "something is lit");
+    let text = std::fs::read_to_string(&json).expect("statistics were written");
+    let stats: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let mut sum = 0.0;
+    for phase in ["load", "build", "refine", "visibility", "transport", "reflect", "display"] {
+        let seconds = stats["seconds"][phase].as_f64().unwrap_or(-1.0);
+        assert!(seconds >= 0.0, "seconds of {phase}: {seconds}");
+        sum += seconds;
+    }
+    let total = stats["seconds"]["total"].as_f64().unwrap_or(-1.0);
+    assert!(sum <= total * 1.001, "phases do not overlap: {sum} s of {total} s");
+    for count in ["polygons", "nodes", "leaves", "links", "rays", "samples", "basis_functions", "brdf_evaluations"] {
+        assert!(stats["counts"][count].as_u64().is_some_and(|n| n > 0), "count of {count} in {text}");
+    }
+    let iterations = stats["iterations"].as_u64().unwrap_or(0);
+    assert_eq!(stats["residuals"].as_array().map_or(0, Vec::len) as u64, iterations, "a residual per iteration");
+    assert!(iterations > 0 && stats["skipped"].as_object().is_some_and(|s| !s.is_empty()), "work done and avoided");
+    let peak = stats["peak_bytes"].as_u64();
+    assert!(peak.is_some_and(|bytes| bytes > 1 << 20) || !cfg!(target_os = "linux"), "peak memory: {peak:?}");
+}
+
+#[test]
+fn a_time_budget_ends_soon() {
+    let folder = Folder::new("budget");
+    let camera = folder.write("camera.json", IN_THE_FURNACE);
+    let pfm = folder.path("a.pfm");
+    let begin = Instant::now();
+    succeeds(&["furnace", "--error", "0.001", "--time-budget", "0.2", "--camera", &camera, "--image", &pfm]);
+    let seconds = begin.elapsed().as_secs_f64();
+    // Without the budget this takes minutes; slow machines need time to start, and for the picture.
+    assert!(seconds < 20.0, "{seconds} s with a budget of 0.2 s");
+    assert!(read_pfm(&pfm).2.iter().all(|c| c.is_finite() && *c > 0.0), "there is something to see");
+}
+
+#[test]
+fn without_a_display_frames_are_written() {
+    let folder = Folder::new("frames");
+    let camera = folder.write("camera.json", IN_THE_FURNACE);
+    let mut command = command(&["furnace", "--error", "0.5", "--camera", &camera]);
+    let output = command.current_dir(&folder.0).output().expect("the command runs");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "no window is no mistake: {text}");
+    let told = text.lines().filter(|line| line.contains("hr-view-frames instead")).count();
+    assert_eq!(told, 1, "one line says where frames go: {text}");
+    let mut frames = 0;
+    for entry in std::fs::read_dir(folder.0.join("hr-view-frames")).expect("the folder was made") {
+        let picture = image::open(entry.expect("an entry").path()).expect("a PNG file").into_rgb8();
+        assert_eq!(picture.dimensions(), (24, 16), "size of the command line's camera");
+        assert!(picture.as_raw().iter().all(|code| *code > 8), "walls that shine are not black");
+        frames += 1;
+    }
+    assert_eq!(frames, 60, "frames along the walk");
 }

@@ -1,0 +1,364 @@
+//! From a solution to triangles: the fans of its leaves, curved ones cut until they look round.
+//!
+//! An edge is cut or not by its own ends alone, so that the triangles on both sides of it agree and no crack opens.
+
+use crate::display::{Batch, DisplayMesh};
+use glam::{DVec3, Mat3, Vec2, Vec3};
+use glossy_ext::GlossyField;
+use hr_diffuse::hierarchy::Kind;
+use hr_diffuse::{Domain, Geometry, Rgb, Solution};
+use hr_scene::{Scene, Texture};
+use std::collections::HashMap;
+use std::f32::consts::FRAC_1_PI;
+use std::sync::Arc;
+
+/// A chord of a curved surface spans at most this angle (radians, 5°) …
+const FINE: f32 = 0.087;
+/// … unless it leaves the surface by less than this (unit space: 0.1 mm in a room of 10 m) …
+const FLAT_ENOUGH: f32 = 1e-5;
+/// … and then at most this (radians, 20°).
+const COARSE: f32 = 0.35;
+/// An edge is halved at most so often: a full turn to less than a degree and a half.
+const MOST_CUTS: u32 = 8;
+/// No index.
+const NONE: u32 = u32::MAX;
+
+/// Where the glossy light of a vertex comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Source {
+    /// A leaf that the vertex belongs to.
+    pub leaf: u32,
+    /// Where it is on the leaf's surface.
+    pub uv: Vec2,
+    /// Vertices of the solution and their weights, which sum to 1.
+    pub corners: [(u32, f32); 3],
+}
+
+/// Makes the triangles that show a solution, and for each of [`DisplayMesh::glossy`] where its light comes from.
+#[must_use]
+pub fn facets(scene: &Scene, solution: &Solution<GlossyField>) -> (DisplayMesh, Vec<Source>) {
+    let mut maker = Maker::new(scene, solution);
+    for leaf in solution.elements.patch_leaves() {
+        maker.leaf(leaf);
+    }
+    for surface in 0..solution.scene.surfaces().len() {
+        maker.black_back(surface as u32);
+    }
+    maker.finish()
+}
+
+/// A point of a surface that has become a vertex.
+#[derive(Clone, Copy)]
+struct Point {
+    uv: Vec2,
+    /// In unit space.
+    at: Vec3,
+    index: u32,
+}
+
+/// What the triangles of one leaf have in common.
+struct Look<'a> {
+    leaf: u32,
+    surface: u32,
+    geometry: &'a Geometry,
+    back: bool,
+    /// Whether triangles that run counter-clockwise in (u, v) are seen so from the side that is shown.
+    counter_clockwise: bool,
+    /// Whether what is behind them is black.
+    black_behind: bool,
+    glossy: bool,
+    tint: Rgb,
+    emission: Rgb,
+    /// 0 without texture, else one more than the texture's index.
+    batch: usize,
+    /// Whether tint or texture coordinates vary over the surface.
+    varies: bool,
+}
+
+struct Maker<'a> {
+    scene: &'a Scene,
+    solution: &'a Solution<GlossyField>,
+    mesh: DisplayMesh,
+    sources: Vec<Source>,
+    /// Triangles per batch.
+    batches: Vec<Vec<u32>>,
+    /// Of each material: 0, or one more than the index of its texture.
+    texture_of: Vec<usize>,
+    /// Vertex of each of the solution's vertices on fronts and on backs.
+    plain: Vec<[u32; 2]>,
+    /// The same where attributes vary, by surface and side.
+    varied: HashMap<(u32, u32, bool), u32>,
+    /// Vertices on cut edges, by place, surface and side.
+    cut: HashMap<([u32; 3], u32, bool), u32>,
+    /// Black vertex behind a vertex.
+    behind: HashMap<u32, u32>,
+}
+
+impl<'a> Maker<'a> {
+    fn new(scene: &'a Scene, solution: &'a Solution<GlossyField>) -> Self {
+        let mut textures: Vec<Texture> = Vec::new();
+        let texture_of = scene.materials.iter().map(|material| {
+            let Some(texture) = &material.texture else { return 0 };
+            let same = |t: &Texture| {
+                Arc::ptr_eq(&t.texels, &texture.texels) && t.transform == texture.transform && t.wrap == texture.wrap
+            };
+            1 + textures.iter().position(same).unwrap_or_else(|| {
+                textures.push(texture.clone());
+                textures.len() - 1
+            })
+        });
+        let texture_of: Vec<usize> = texture_of.collect();
+        let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
+        let origin = low + 0.5 * (high - low);
+        let mesh = DisplayMesh { origin, primaries: scene.primaries, ..DisplayMesh::default() };
+        Self {
+            scene,
+            solution,
+            batches: vec![Vec::new(); textures.len() + 1],
+            mesh: DisplayMesh { textures, ..mesh },
+            sources: Vec::new(),
+            texture_of,
+            plain: vec![[NONE; 2]; solution.vertices.positions.len()],
+            varied: HashMap::new(),
+            cut: HashMap::new(),
+            behind: HashMap::new(),
+        }
+    }
+
+    /// The fan of a leaf.
+    fn leaf(&mut self, leaf: u32) {
+        let solution = self.solution;
+        let element = &solution.elements.nodes[leaf as usize];
+        let (surface, back) = (element.source, element.kind == Kind::Back);
+        let geometry = &solution.scene.surfaces()[surface as usize];
+        let material = &self.scene.materials[element.material as usize];
+        let varies = self.scene.attributes_of(surface).is_some();
+        let look = Look {
+            leaf,
+            surface,
+            geometry,
+            back,
+            counter_clockwise: runs_counter_clockwise(geometry) != back,
+            black_behind: is_round(geometry) && solution.elements.surface_nodes[surface as usize][1] == NONE,
+            glossy: element.active,
+            tint: material.reflector.diffuse() * FRAC_1_PI,
+            emission: if back { Rgb::ZERO } else { material.exitance * FRAC_1_PI },
+            batch: if varies { self.texture_of[element.material as usize] } else { 0 },
+            varies,
+        };
+        let fan = solution.vertices.fan(leaf);
+        let mut points = fan.iter().map(|corner| Point {
+            uv: corner.uv,
+            at: solution.vertices.positions[corner.vertex as usize],
+            index: self.vertex(&look, corner.vertex, corner.uv),
+        });
+        let Some(middle) = points.next() else { return };
+        let outline: Vec<Point> = points.collect();
+        let cuts = if is_round(geometry) { MOST_CUTS } else { 0 };
+        for (i, &a) in outline.iter().enumerate() {
+            self.triangle(&look, [middle, a, outline[(i + 1) % outline.len()]], cuts);
+        }
+    }
+
+    /// A triangle counter-clockwise in (u, v), whose edges may be halved so many times more.
+    fn triangle(&mut self, look: &Look, corners: [Point; 3], cuts: u32) {
+        let [a, b, c] = corners;
+        let mut middles = [None; 3];
+        if cuts > 0 {
+            for (i, middle) in middles.iter_mut().enumerate() {
+                *middle = self.middle(look, &corners[i], &corners[(i + 1) % 3]);
+            }
+        }
+        let next = cuts.saturating_sub(1);
+        match middles {
+            [None, None, None] => self.emit(look, [a.index, b.index, c.index]),
+            [Some(ab), Some(bc), Some(ca)] => {
+                for part in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
+                    self.triangle(look, part, next);
+                }
+            }
+            // One or two: turned until the edge before the uncut one comes first.
+            [Some(m), None, other] => self.halves(look, [a, b, c], m, other, next),
+            [other, Some(m), None] => self.halves(look, [b, c, a], m, other, next),
+            [None, other, Some(m)] => self.halves(look, [c, a, b], m, other, next),
+        }
+    }
+
+    /// A triangle whose first edge is cut, its second is not, its third may be.
+    fn halves(&mut self, look: &Look, [a, b, c]: [Point; 3], m: Point, other: Option<Point>, cuts: u32) {
+        self.triangle(look, [m, b, c], cuts);
+        match other {
+            None => self.triangle(look, [a, m, c], cuts),
+            Some(n) => {
+                self.triangle(look, [a, m, n], cuts);
+                self.triangle(look, [m, c, n], cuts);
+            }
+        }
+    }
+
+    /// The vertex in the middle of an edge, where the surface leaves the edge too far.
+    fn middle(&mut self, look: &Look, a: &Point, b: &Point) -> Option<Point> {
+        let uv = 0.5 * (a.uv + b.uv);
+        let at = look.geometry.point(uv);
+        let (chord, off) = (b.at - a.at, at - a.at);
+        let length = chord.length();
+        let distance =
+            if length > 0.0 { (off - chord * (off.dot(chord) / (length * length))).length() } else { off.length() };
+        // An arc of a small angle t over a chord of length 1 is t/8 high.
+        let angle = if length > 0.0 { 8.0 * distance / length } else { f32::INFINITY };
+        if distance <= f32::EPSILON || angle < if distance < FLAT_ENOUGH { COARSE } else { FINE } {
+            return None;
+        }
+        // Adding zero makes −0 the same as 0.
+        let key = ((at + Vec3::ZERO).to_array().map(f32::to_bits), look.surface, look.back);
+        let index = match self.cut.get(&key) {
+            Some(&index) => index,
+            None => {
+                let corners = self.solution.vertices.interpolation(look.leaf, uv);
+                let irradiance = &self.solution.vertices.irradiance;
+                let light = corners.iter().map(|&(vertex, weight)| irradiance[vertex as usize] * weight).sum();
+                let side = if look.back { -1.0 } else { 1.0 };
+                let normal = self.solution.scene.shading_normal(look.surface, uv) * side;
+                let index = self.add(look, at, normal, light, Source { leaf: look.leaf, uv, corners });
+                self.cut.insert(key, index);
+                index
+            }
+        };
+        Some(Point { uv, at, index })
+    }
+
+    fn emit(&mut self, look: &Look, [a, b, c]: [u32; 3]) {
+        if a == b || b == c || c == a {
+            return;
+        }
+        let corners = if look.counter_clockwise { [a, b, c] } else { [a, c, b] };
+        self.batches[look.batch].extend(corners);
+        if look.black_behind {
+            let [a, b, c] = corners.map(|vertex| self.black_behind(vertex));
+            self.batches[0].extend([a, c, b]);
+        }
+    }
+
+    /// The vertex that stands for one of the solution's.
+    fn vertex(&mut self, look: &Look, vertex: u32, uv: Vec2) -> u32 {
+        let known = if look.varies {
+            self.varied.get(&(vertex, look.surface, look.back)).copied().unwrap_or(NONE)
+        } else {
+            self.plain[vertex as usize][usize::from(look.back)]
+        };
+        if known != NONE {
+            return known;
+        }
+        let vertices = &self.solution.vertices;
+        let at = vertex as usize;
+        let source = Source { leaf: look.leaf, uv, corners: [(vertex, 1.0), (vertex, 0.0), (vertex, 0.0)] };
+        let index = self.add(look, vertices.positions[at], vertices.normals[at], vertices.irradiance[at], source);
+        if look.varies {
+            self.varied.insert((vertex, look.surface, look.back), index);
+        } else {
+            self.plain[at][usize::from(look.back)] = index;
+        }
+        index
+    }
+
+    fn add(&mut self, look: &Look, at: Vec3, normal: Vec3, irradiance: Rgb, source: Source) -> u32 {
+        let (mut tint, mut uv) = (look.tint, Vec2::ZERO);
+        if let Some(attributes) = self.scene.attributes_of(look.surface) {
+            let surface = &self.scene.surfaces[look.surface as usize];
+            let material = &self.scene.materials[surface.material as usize];
+            let color = material.base_color * attributes.color_at(&surface.shape, source.uv.x, source.uv.y);
+            tint = self.scene.diffuse_of(look.surface, color) * FRAC_1_PI;
+            uv = attributes.uv_at(&surface.shape, source.uv.x, source.uv.y);
+        }
+        let index = self.push(at, normal);
+        self.mesh.irradiance.push(irradiance);
+        self.mesh.tint.push(tint);
+        self.mesh.emission.push(look.emission);
+        self.mesh.uv.push(uv);
+        if look.glossy {
+            self.mesh.glossy.push(index);
+            self.sources.push(source);
+        }
+        index
+    }
+
+    /// The black vertex behind a vertex.
+    fn black_behind(&mut self, vertex: u32) -> u32 {
+        if let Some(&known) = self.behind.get(&vertex) {
+            return known;
+        }
+        let (position, normal) = (self.mesh.positions[vertex as usize], self.mesh.normals[vertex as usize]);
+        let index = self.mesh.positions.len() as u32;
+        self.mesh.positions.push(position);
+        self.mesh.normals.push(-normal);
+        self.black();
+        self.behind.insert(vertex, index);
+        index
+    }
+
+    /// The back of a polygon that absorbs there: black, and opaque. Round ones take the triangles of their front, so
+    /// that no rim of black sticks out from behind it.
+    fn black_back(&mut self, surface: u32) {
+        let geometry = &self.solution.scene.surfaces()[surface as usize];
+        if self.solution.elements.surface_nodes[surface as usize][1] != NONE || is_round(geometry) {
+            return;
+        }
+        let corners: Vec<u32> = geometry
+            .corners(Domain::WHOLE)
+            .into_iter()
+            .map(|uv| {
+                let index = self.push(geometry.point(uv), -geometry.normal(uv));
+                self.black();
+                index
+            })
+            .collect();
+        let forward = !runs_counter_clockwise(geometry);
+        for i in 1..corners.len() - 1 {
+            let [a, b, c] = [corners[0], corners[i], corners[i + 1]];
+            self.batches[0].extend(if forward { [a, b, c] } else { [a, c, b] });
+        }
+    }
+
+    fn push(&mut self, at: Vec3, normal: Vec3) -> u32 {
+        let index = self.mesh.positions.len() as u32;
+        let position = self.solution.scene.normalization.to_scene(at) - self.mesh.origin;
+        self.mesh.positions.push(position.as_vec3());
+        self.mesh.normals.push(normal);
+        index
+    }
+
+    fn black(&mut self) {
+        self.mesh.irradiance.push(Rgb::ZERO);
+        self.mesh.tint.push(Rgb::ZERO);
+        self.mesh.emission.push(Rgb::ZERO);
+        self.mesh.uv.push(Vec2::ZERO);
+    }
+
+    fn finish(self) -> (DisplayMesh, Vec<Source>) {
+        let mut mesh = self.mesh;
+        for (batch, mut triangles) in self.batches.into_iter().enumerate() {
+            let start = mesh.indices.len() as u32;
+            mesh.indices.append(&mut triangles);
+            let indices = start..mesh.indices.len() as u32;
+            if !indices.is_empty() {
+                mesh.batches.push(Batch { indices, texture: batch.checked_sub(1).map(|t| t as u32) });
+            }
+        }
+        (mesh, self.sources)
+    }
+}
+
+/// Whether edges of parts may be round; a disk's outline is, though it is flat.
+fn is_round(geometry: &Geometry) -> bool {
+    matches!(geometry, Geometry::Revolution(_))
+}
+
+/// Whether the front of a surface is where its (u, v) run counter-clockwise.
+fn runs_counter_clockwise(geometry: &Geometry) -> bool {
+    // Well inside of triangles, too, and far from poles and seams.
+    let (at, step) = (Vec2::new(0.3, 0.4), 0.01);
+    let origin = geometry.point(at);
+    let along_u = geometry.point(at + Vec2::X * step) - origin;
+    let along_v = geometry.point(at + Vec2::Y * step) - origin;
+    Mat3::from_cols(along_u, along_v, geometry.normal(at)).determinant() > 0.0
+}

@@ -1,0 +1,90 @@
+//! What `--stats` writes: times, counts, what was skipped and why.
+
+use crate::solved::Solved;
+use serde_json::{Value, json};
+
+/// Seconds that the solver does not know of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Times {
+    /// Reading the scene.
+    pub load: f64,
+    /// Making triangles, pictures and frames.
+    pub show: f64,
+    /// From the program's start to now.
+    pub total: f64,
+}
+
+/// The statistics of a solution as JSON. Phases do not overlap: `refine` is without the rays, which are `visibility`,
+/// and values at vertices are part of `display`. `error` is the relative error that the solution is believed to have,
+/// `asked` that which was asked for.
+#[must_use]
+pub fn stats(solved: &Solved, asked: f32, error: f32, times: &Times) -> Value {
+    let solution = &solved.solution;
+    let (stats, seconds, skipped) = (&solution.stats, &solution.stats.seconds, &solution.stats.skipped);
+    let visibility = seconds.visibility.min(seconds.refine);
+    let samples: usize = solution.incident.iter().map(Vec::len).sum();
+    let basis_functions: usize = solution.reflected.iter().map(|haar| haar.basis_functions()).sum();
+    json!({
+        "scene": solved.scene.name,
+        "error": error,
+        "error_asked": asked,
+        "seconds": {
+            "load": times.load,
+            "build": seconds.build,
+            "refine": seconds.refine - visibility,
+            "visibility": visibility,
+            "transport": seconds.transport,
+            "reflect": seconds.reflect,
+            "display": seconds.reconstruct + times.show,
+            "total": times.total,
+        },
+        "counts": {
+            "polygons": stats.polygons,
+            "nodes": stats.nodes,
+            "leaves": stats.leaves,
+            "links": stats.links,
+            "rays": stats.rays + stats.vertex_rays,
+            "vertex_rays": stats.vertex_rays,
+            "pairs": stats.pairs,
+            "vertices": solution.vertices.positions.len(),
+            "samples": samples,
+            "basis_functions": basis_functions,
+            "brdf_evaluations": solution.field.counters().brdf_evaluations(),
+        },
+        "skipped": {
+            "black_receivers": skipped.black_receivers,
+            "unlit_senders": skipped.unlit_senders,
+            "facing": skipped.facing,
+            "proved_free": skipped.proved_free,
+            "converged_leaves": skipped.converged_leaves,
+        },
+        "iterations": stats.iterations,
+        "residuals": stats.residuals,
+        "peak_bytes": peak_bytes(),
+    })
+}
+
+/// The most memory that the process has had so far; `None` where the system does not tell.
+fn peak_bytes() -> Option<u64> {
+    // Linux: "VmHWM:    12345 kB".
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kibibytes * 1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn peak_memory_is_that_of_the_process() {
+        let before = peak_bytes().expect("Linux tells");
+        // Written to, so that the pages are there.
+        let block = vec![1_u8; 64 << 20];
+        let after = peak_bytes().expect("Linux tells");
+        assert!(block.iter().all(|&b| b == 1), "the block stays until here");
+        assert!(before > 100_000 && after >= 64 << 20 && after >= before, "{before} bytes, then {after}");
+    }
+}

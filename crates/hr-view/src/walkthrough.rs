@@ -1,0 +1,81 @@
+//! A solution, ready to be walked through.
+
+use crate::display::{DisplayMesh, Walkable};
+use crate::facets::{Source, facets};
+use crate::glossy;
+use crate::raycast::Mode;
+use crate::solved::Solved;
+use glam::{DVec3, Vec3};
+use glossy_ext::{Incident, Place};
+use hr_diffuse::NodeId;
+use hr_scene::{Camera, Rgb};
+use std::sync::Arc;
+
+/// Reflecting samples at vertices, senders count as at least so wide (standard deviation in radians, about 1.7°): as
+/// in light transport, and so that a highlight between two vertices does not vanish.
+const NARROWEST: f32 = 0.03;
+
+/// A solution as triangles, with the light that follows the eye.
+#[derive(Debug)]
+pub struct Walkthrough<'a> {
+    solved: &'a Solved,
+    mode: Mode,
+    mesh: DisplayMesh,
+    /// Per entry of the mesh's `glossy`.
+    sources: Vec<Source>,
+}
+
+impl<'a> Walkthrough<'a> {
+    /// Makes the triangles. With [`Mode::Samples`] glossy light is that of the illumination samples, reflected at each
+    /// vertex; perfect mirrors, which samples cannot show, keep their distributions.
+    #[must_use]
+    pub fn new(solved: &'a Solved, mode: Mode) -> Self {
+        let (mesh, sources) = facets(&solved.scene, &solved.solution);
+        Self { solved, mode, mesh, sources }
+    }
+
+    /// Glossy radiance of a vertex toward an eye in unit space.
+    fn radiance(&self, eye: Vec3, slot: usize, scratch: &mut Vec<Incident>) -> Rgb {
+        let solution = &self.solved.solution;
+        let source = &self.sources[slot];
+        let surface = solution.elements.nodes[source.leaf as usize].source;
+        let at = solution.scene.surfaces()[surface as usize].point(source.uv);
+        let away = (eye - at).normalize_or_zero();
+        if self.mode == Mode::Samples {
+            let material = &self.solved.scene.materials[solution.scene.surface_materials[surface as usize] as usize];
+            if material.reflector.mirror() == Rgb::ZERO {
+                let color = self.solved.scene.base_color(surface, source.uv.x, source.uv.y);
+                let reflector = color
+                    .and_then(|color| material.reflector.with_base_color(color))
+                    .unwrap_or_else(|| Arc::clone(&material.reflector));
+                let normal = self.mesh.normals[self.mesh.glossy[slot] as usize];
+                let place = Place::new(at, normal);
+                let leaf = NodeId(source.leaf);
+                return glossy::reflected(solution, reflector.as_ref(), leaf, &place, away, NARROWEST, scratch);
+            }
+        }
+        glossy::interpolated(solution, &source.corners, away)
+    }
+}
+
+impl Walkable for Walkthrough<'_> {
+    fn name(&self) -> &str {
+        &self.solved.scene.name
+    }
+
+    fn mesh(&self) -> &DisplayMesh {
+        &self.mesh
+    }
+
+    fn cameras(&self) -> &[(String, Camera)] {
+        &self.solved.scene.cameras
+    }
+
+    fn glossy_radiance(&self, eye: DVec3, vertices: &[u32], out: &mut [Rgb]) {
+        let eye = self.solved.solution.scene.normalization.to_unit(eye);
+        let mut scratch = Vec::new();
+        for (out, &slot) in out.iter_mut().zip(vertices) {
+            *out = self.radiance(eye, slot as usize, &mut scratch).max(Rgb::ZERO);
+        }
+    }
+}
