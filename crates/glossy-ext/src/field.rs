@@ -2,7 +2,7 @@
 
 use crate::haar::{Beyond, Haar, Known, Peak, Refinement, Support};
 use crate::reflector::{Incident, Reflector, Ward};
-use crate::samples::{IlluminationSample, Place, SampleSet, arriving};
+use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_weak};
 use crate::Rgb;
 use glam::Vec3;
 use hr_diffuse::{Cone, Hierarchy, LightField, NodeId, Transfer};
@@ -12,8 +12,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// In light transport lobes are at least as wide as this makes them (standard deviation in radians, about 1.7°):
 /// what distributions of level 6 resolve. Narrower ones are followed by rays at display.
 const NARROWEST: f32 = 0.03;
+/// A lobe this many times wider than a sender hardly shows the sender's extent: its variance grows by 1/32.
+const WIDE: f32 = 4.0;
 /// Slope of the lobe that stands for a perfect mirror in light transport.
 const MIRROR_ALPHA: f32 = 0.03;
+/// Finest level of the distributions of inner nodes.
+const PULLED_LEVEL: u8 = 4;
 /// Of a leaf's samples, the directions of so many strongest ones are told to the projection as peaks.
 const PEAKS: usize = 12;
 
@@ -54,6 +58,8 @@ pub struct GlossyField {
     /// `None`: the material is diffuse.
     materials: Vec<Option<Material>>,
     refinement: Refinement,
+    /// For averages: what is linked at inner nodes needs no fine detail.
+    pulled: Refinement,
     counters: Counters,
 }
 
@@ -73,7 +79,8 @@ impl GlossyField {
                 }
             })
         });
-        Self { materials: materials.collect(), refinement, counters: Counters::default() }
+        let pulled = Refinement { max_level: refinement.max_level.min(PULLED_LEVEL), ..refinement };
+        Self { materials: materials.collect(), refinement, pulled, counters: Counters::default() }
     }
 
     /// Work done so far.
@@ -149,8 +156,14 @@ impl LightField for GlossyField {
         if incident.is_empty() {
             return Haar::default();
         }
+        merge_weak(&mut incident);
+        // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
+        let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
         for sample in &mut incident {
-            sample.extent = sample.extent.max(NARROWEST);
+            sample.extent = sample.extent.max(if width < WIDE * NARROWEST { NARROWEST } else { 0.0 });
+            if sample.extent * WIDE < width {
+                sample.extent = 0.0;
+            }
         }
         let flat = hierarchy.is_flat(leaf);
         let known = Known {
@@ -196,7 +209,7 @@ impl LightField for GlossyField {
             })
             .collect();
         let weighted: Vec<(f32, &Haar)> = oriented.iter().map(|(share, haar)| (*share, haar.as_ref())).collect();
-        Haar::average(&weighted, &self.refinement, Rgb::ZERO)
+        Haar::average(&weighted, &self.pulled, Rgb::ZERO)
     }
 
     fn radiance(&self, exitant: &Haar, away: Vec3) -> Rgb {

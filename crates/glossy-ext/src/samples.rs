@@ -103,6 +103,50 @@ pub fn arriving<H: Hierarchy>(
     }
 }
 
+/// Samples that are merged make up at most this share of the irradiance at a place.
+const WEAK_SHARE: f32 = 0.3;
+/// Cells along each side of the square that the hemisphere of directions is mapped to.
+const CELLS: usize = 6;
+
+/// Merges the weakest samples at a place into one for each cell of a grid of directions (about 25° wide): irradiance
+/// adds up, the direction is the weighted mean, and the extent grows by how far they spread. The strong ones, which
+/// make the peaks of what is reflected, stay as they are.
+pub fn merge_weak(incident: &mut Vec<Incident>) {
+    if incident.len() <= CELLS * CELLS {
+        return;
+    }
+    let strength = |i: &Incident| i.irradiance.element_sum();
+    incident.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+    let total: f32 = incident.iter().map(strength).sum();
+    let mut rest = 0.0;
+    let mut strong = incident.len();
+    while strong > 0 && rest + strength(&incident[strong - 1]) <= WEAK_SHARE * total {
+        strong -= 1;
+        rest += strength(&incident[strong]);
+    }
+    // Direction, squared extent plus squared length, weight and irradiance per cell.
+    let mut cells = [(Vec3::ZERO, 0.0_f32, 0.0_f32, Rgb::ZERO); CELLS * CELLS];
+    for sample in incident.drain(strong..) {
+        let weight = strength(&sample);
+        let square = sample.direction.truncate() / (1.0 + sample.direction.z.max(0.0)) * 0.5 + 0.5;
+        let cell = (square * CELLS as f32).clamp(glam::Vec2::ZERO, glam::Vec2::splat(CELLS as f32 - 1.0));
+        let cell = &mut cells[cell.y as usize * CELLS + cell.x as usize];
+        cell.0 += sample.direction * weight;
+        cell.1 += sample.extent * sample.extent * weight;
+        cell.2 += weight;
+        cell.3 += sample.irradiance;
+    }
+    for (direction, extent, weight, irradiance) in cells {
+        if weight > 0.0 {
+            let mean = direction / weight;
+            // Unit vectors about their mean: 1 − |mean|² is their variance; a disk's is half its squared radius.
+            let spread = 2.0 * (1.0 - mean.length_squared()).max(0.0);
+            let extent = (extent / weight + spread).sqrt().min(std::f32::consts::FRAC_PI_2);
+            incident.push(Incident { direction: mean.normalize_or(Vec3::Z), extent, irradiance });
+        }
+    }
+}
+
 /// A sample received at `from` as it arrives at `place`; none below the horizon.
 fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Place, place: &Place) -> Option<Incident> {
     let sender = sample.sender();

@@ -31,6 +31,7 @@ const DIRECTIONAL_SHARE: f32 = 0.05;
 const FIRST_SEGMENTS: u32 = 4;
 const MOST_SEGMENTS: u32 = 32;
 
+static DS: std::sync::LazyLock<f32> = std::sync::LazyLock::new(|| std::env::var("DS").map_or(DIRECTIONAL_SHARE, |v| v.parse().unwrap()));
 static EX: std::sync::LazyLock<f32> = std::sync::LazyLock::new(|| std::env::var("EX").map_or(0.5, |v| v.parse().unwrap()));
 /// A link to be, between two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -196,6 +197,7 @@ fn split_elements<L: LightField>(
                 exitant.direction.push(element.mean_normal);
                 exitant.irradiance.push(exitant.irradiance[parent]);
                 exitant.reflected_as.push(exitant.reflected_as[parent]);
+                exitant.peak.push(0.0);
                 light.reflected.push(L::Exitant::default());
             }
         }
@@ -216,14 +218,20 @@ struct Interval {
 
 impl Interval {
     fn error(&self) -> f32 {
-        GEOMETRY_SHARE * self.geometry + RADIOSITY_SHARE * self.radiosity + DIRECTIONAL_SHARE * self.directional
+        GEOMETRY_SHARE * self.geometry + RADIOSITY_SHARE * self.radiosity + *DS * self.directional
     }
 }
 
-fn interval<L: LightField>(light: Light<'_, L>, sender: u32, bounds: &FactorBounds) -> Interval {
-    let (low, high) = light.emitted_bounds(sender, &bounds.from_sender);
+/// The interval of a pair. Directional light below `negligible` is not looked at closely.
+fn interval<L: LightField>(light: Light<'_, L>, sender: u32, bounds: &FactorBounds, negligible: f32) -> Interval {
     let [least, most] = light.diffuse_range(sender);
     let (factor, spread) = (0.5 * (bounds.max + bounds.min), (most - least).max_element());
+    let peak = light.directional_most(sender);
+    let (low, high) = if peak * bounds.max > negligible {
+        light.emitted_bounds(sender, &bounds.from_sender)
+    } else {
+        (least, most + peak)
+    };
     let typical = (0.5 * (least + most)).max(light.emitted(sender, bounds.from_sender.axis)).max_element();
     Interval {
         most: high.max_element() * bounds.max,
@@ -249,15 +257,15 @@ fn decide<L: LightField>(
         return Verdict::Facing;
     }
     let own = pair.receiver == pair.sender;
-    if light.is_dark(pair.sender) {
+    if light.emitted_most(pair.sender) <= 0.0 {
         return Verdict::Unlit;
     }
     if own {
         return split_self(light, pair.receiver, tolerance, stopped);
     }
     let Some(bounds) = factor_bounds(light.scene, r, s) else { return Verdict::Facing };
-    let interval = interval(light, pair.sender, &bounds);
     let weight = r.importance * (r.area / tolerance.area).powf(*EX);
+    let interval = interval(light, pair.sender, &bounds, tolerance.error / weight);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
     if by_bounds > tolerance.error {
@@ -320,9 +328,8 @@ fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Toleranc
         return Verdict::SplitBoth;
     }
     // The inside of a curved surface: split while the light that would be lost matters.
-    let (_, high) = light.emitted_bounds(node, &crate::Cone::SPHERE);
     let weight = element.importance * (element.area / tolerance.area).powf(*EX);
-    let at_stake = high.max_element() * weight;
+    let at_stake = light.emitted_most(node) * weight;
     let splittable = element.is_patch() && element.radius > tolerance.smallest;
     if at_stake > tolerance.error && splittable && !stopped { Verdict::SplitBoth } else { Verdict::Facing }
 }

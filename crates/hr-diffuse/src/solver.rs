@@ -22,6 +22,8 @@ const LINK_SHARE: f32 = 0.05;
 const SMALLEST_SHARE: f32 = 0.008;
 /// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
 const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
+/// A leaf's light is reflected anew once its irradiance has changed by this share of the error asked for.
+const REFLECT_SHARE: f32 = 0.5;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
 
@@ -114,6 +116,7 @@ impl<L: LightField> Solver<L> {
                 direction: vec![Vec3::ZERO; count],
                 irradiance: vec![Rgb::ZERO; count],
                 reflected_as: (0..count as u32).collect(),
+                peak: vec![0.0; count],
             },
             links: Links::default(),
             field,
@@ -218,8 +221,8 @@ impl<L: LightField> Solver<L> {
         self.gather();
         self.push();
         let middle = Instant::now();
-        self.reflect();
-        self.pull_reflected();
+        let changed = self.reflect();
+        self.pull_reflected(&changed);
         let end = Instant::now();
         self.pull();
         self.stats.seconds.transport += (middle - start).as_secs_f64() + end.elapsed().as_secs_f64();
@@ -383,12 +386,13 @@ impl<L: LightField> Solver<L> {
     }
 
     /// The extension turns the incident light of its leaves into exitant light.
-    fn reflect(&mut self) {
+    /// Tells which leaves changed.
+    fn reflect(&mut self) -> Vec<u32> {
         let elements = &self.elements;
         if !elements.nodes[0].active {
-            return;
+            return Vec::new();
         }
-        let tolerance = 0.1 * self.settings.error;
+        let tolerance = REFLECT_SHARE * self.settings.error;
         self.last_reflected.resize(elements.nodes.len(), Rgb::splat(f32::NEG_INFINITY));
         let leaves: Vec<u32> = elements.patch_leaves().filter(|&l| elements.nodes[l as usize].active).collect();
         let all = leaves.len() as u64;
@@ -416,28 +420,34 @@ impl<L: LightField> Solver<L> {
                 self.field.reflect(elements, NodeId(leaf), &path, diffuse)
             })
             .collect();
-        for (leaf, exitant) in leaves.into_iter().zip(exitant) {
+        for (&leaf, exitant) in leaves.iter().zip(exitant) {
             self.reflected[leaf as usize] = exitant;
             self.last_reflected[leaf as usize] = self.exitant.irradiance[leaf as usize];
         }
+        leaves
     }
 
-    /// The extension averages its exitant light bottom-up, all nodes of one height in parallel.
-    fn pull_reflected(&mut self) {
+    /// The extension averages its exitant light bottom-up, all nodes of one height in parallel. Only what is above
+    /// the leaves that changed is averaged anew.
+    fn pull_reflected(&mut self, changed: &[u32]) {
         let elements = &self.elements;
-        if !elements.nodes[0].active {
-            return;
-        }
         let count = elements.nodes.len();
         let mut height = vec![0_u32; count];
+        let mut stale = vec![false; count];
+        for &leaf in changed {
+            stale[leaf as usize] = true;
+        }
         let mut layers: Vec<Vec<u32>> = Vec::new();
         for node in (0..count).rev() {
             let element = &elements.nodes[node];
             let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
             if let Some(tallest) = height[range].iter().copied().max() {
                 height[node] = tallest + 1;
-                if element.active {
-                    let layer = tallest as usize;
+            }
+            if stale[node] {
+                stale[element.parent as usize] = true;
+                if element.child_count > 0 {
+                    let layer = height[node] as usize - 1;
                     layers.resize_with(layers.len().max(layer + 1), Vec::new);
                     layers[layer].push(node as u32);
                 }
@@ -459,6 +469,14 @@ impl<L: LightField> Solver<L> {
         for (node, source) in self.exitant.reflected_as.iter_mut().enumerate() {
             *source = node as u32;
         }
+        let (field, reflected) = (&self.field, &self.reflected);
+        let nodes = self.exitant.peak.par_iter_mut().zip(reflected).zip(&stale);
+        nodes.for_each(|((peak, light), &stale)| {
+            if stale {
+                let (low, high) = field.radiance_bounds(light, &crate::Cone::SPHERE);
+                *peak = high.max(-low).max_element().max(0.0);
+            }
+        });
     }
 
     /// Diffuse radiosity of the leaves, averaged bottom-up with its range and direction.

@@ -26,6 +26,8 @@ pub struct Exitant {
     /// Node whose extension state holds the node's directional light: itself, or the nearest ancestor that
     /// existed when light was last reflected.
     pub reflected_as: Vec<u32>,
+    /// Largest radiance (max channel, any direction) of the directional light that `reflected_as` holds.
+    pub peak: Vec<f32>,
 }
 
 /// Read access to a (partial) solution: geometry, hierarchy and exitant light.
@@ -120,15 +122,21 @@ impl<L: LightField> Light<'_, L> {
         self.exitant.range[sender as usize]
     }
 
-    /// Whether nothing leaves a node.
+    /// Most that a node may emit in any direction (max channel): quick, and looser than the bounds.
     #[must_use]
-    pub fn is_dark(&self, sender: u32) -> bool {
+    pub fn emitted_most(&self, sender: u32) -> f32 {
+        let [_, high] = self.diffuse_range(sender);
+        high.max_element() + self.directional_most(sender)
+    }
+
+    /// The share of the extension's light in [`emitted_most`](Self::emitted_most).
+    pub(crate) fn directional_most(&self, sender: u32) -> f32 {
         let element = self.element(sender);
-        if element.kind == Kind::Light {
-            return false;
+        if !element.active {
+            return 0.0;
         }
-        let (_, high) = self.emitted_bounds(sender, &Cone::SPHERE);
-        high.max_element() <= 0.0
+        let peak = self.exitant.peak[self.exitant.reflected_as[sender as usize] as usize];
+        peak * if element.is_flat() { PI } else { 4.0 * PI }
     }
 
     /// Unoccluded geometric factor of a link toward a receiving point with normal `n` (see
