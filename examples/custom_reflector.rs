@@ -1,4 +1,5 @@
-//! A material of one's own: a cloth that shines at its rim and throws headlights back, solved and looked at.
+//! A material of one's own: paint with glass beads in it, as on road signs, that throws light back to where it comes
+//! from.
 //!
 //! `cargo run --release --example custom_reflector` writes `custom_reflector.png` into the current folder.
 
@@ -14,13 +15,13 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A Lambertian ground, and on it a lobe about the direction that light comes from: what road signs do.
+/// A Lambertian ground, and on it a lobe about the direction that light comes from.
 #[derive(Debug)]
 struct Retroreflector {
     /// Diffuse reflectance.
     ground: Rgb,
     /// Reflectance of the lobe for light along the normal.
-    beads: f32,
+    beads: Rgb,
     /// The lobe is the n-th power of the cosine to the incident direction.
     exponent: f32,
 }
@@ -29,11 +30,11 @@ impl Reflector for Retroreflector {
     // Reciprocal, as the cosine between the two directions is.
     fn eval(&self, incident: Vec3, outgoing: Vec3) -> Rgb {
         let lobe = incident.dot(outgoing).max(0.0).powf(self.exponent);
-        self.ground * FRAC_1_PI + Rgb::splat(self.beads * (self.exponent + 2.0) / (2.0 * PI) * lobe)
+        self.ground * FRAC_1_PI + self.beads * ((self.exponent + 2.0) / (2.0 * PI) * lobe)
     }
 
     // Optional, but then that share travels as radiosity, which is cheap. All else (albedo, peak and width of the
-    // lobe, its mean over a sender) the trait finds out by itself.
+    // lobe, its mean over a sender) the trait finds out numerically; who knows it in closed form overrides it.
     fn diffuse(&self) -> Rgb {
         self.ground
     }
@@ -52,7 +53,7 @@ fn material(name: &str, reflector: impl Reflector + 'static, exitance: Rgb) -> M
 
 /// A lamp beside the camera shines on three balls: plaster, retroreflector, plaster.
 fn scene() -> Result<Scene, Box<dyn Error>> {
-    let beads = Retroreflector { ground: Rgb::new(0.3, 0.08, 0.02), beads: 0.5, exponent: 40.0 };
+    let beads = Retroreflector { ground: Rgb::new(0.3, 0.08, 0.02), beads: Rgb::new(0.1, 0.07, 0.02), exponent: 40.0 };
     let quad = |corner: DVec3, a: DVec3, b: DVec3, material| {
         Surface::new(Shape::Quad([corner, corner + a, corner + a + b, corner + b]), material)
     };
@@ -91,7 +92,7 @@ fn scene() -> Result<Scene, Box<dyn Error>> {
 fn main() -> Result<(), Box<dyn Error>> {
     let scene = Arc::new(scene()?);
     let solved = Solved::new(Arc::clone(&scene), Settings { error: 0.1 }, &mut |_| ControlFlow::Continue(()))?;
-    let image = RayCaster::new(&scene, &solved.solution, Mode::Samples).render(&scene.cameras[0].1, &|_| ());
+    let image = RayCaster::new(&scene, &solved.solution, Mode::Distributions).render(&scene.cameras[0].1, &|_| ());
     let path = Path::new("custom_reflector.png");
     image.save(path, &ToneMap::default(), scene.primaries)?;
     println!("{}", std::path::absolute(path)?.display());
