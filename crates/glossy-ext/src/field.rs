@@ -5,7 +5,7 @@ use crate::reflector::{Incident, Reflector, Ward};
 use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_weak};
 use crate::Rgb;
 use glam::Vec3;
-use hr_diffuse::{Cone, Hierarchy, LightField, NodeId, Transfer};
+use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -18,6 +18,10 @@ const WIDE: f32 = 4.0;
 const MIRROR_ALPHA: f32 = 0.03;
 /// Finest level of the distributions of inner nodes.
 const PULLED_LEVEL: u8 = 4;
+/// A leaf's glossy part reflects at most this times its mean albedo: directions differ, and projections err.
+const MOST_GAIN: f32 = 1.15;
+/// Samples are scaled up by at most this to add up to a leaf's irradiance.
+const MOST_BALANCE: f32 = 4.0;
 /// Of a leaf's samples, the directions of so many strongest ones are told to the projection as peaks.
 const PEAKS: usize = 12;
 
@@ -27,8 +31,8 @@ struct Material {
     reflector: Arc<dyn Reflector>,
     /// Stands for the perfect mirror that is part of the reflector.
     mirror: Option<Ward>,
-    /// Largest channel of what is reflected beside the diffuse part.
-    albedo: f32,
+    /// What is reflected beside the diffuse part.
+    albedo: Rgb,
 }
 
 /// Work counters.
@@ -75,7 +79,7 @@ impl GlossyField {
                     mirror: (mirror.max_element() > 0.0)
                         .then(|| Ward::new(Rgb::ZERO, mirror, MIRROR_ALPHA).ok())
                         .flatten(),
-                    albedo: (reflector.glossy_albedo() + mirror).max_element().max(0.0),
+                    albedo: (reflector.glossy_albedo() + mirror).max(Rgb::ZERO),
                 }
             })
         });
@@ -132,11 +136,22 @@ fn peaks(material: &Material, incident: &[Incident], place: &Place) -> Vec<Peak>
         .collect()
 }
 
+/// Scales samples, each renewed for a place on its own, so that together they are the irradiance that arrived there.
+fn balance(incident: &mut [Incident], irradiance: Rgb) {
+    let sum: f32 = incident.iter().map(|i| i.irradiance.element_sum()).sum();
+    if sum > 0.0 {
+        let scale = (irradiance.element_sum() / sum).min(MOST_BALANCE);
+        for sample in incident {
+            sample.irradiance *= scale;
+        }
+    }
+}
+
 impl LightField for GlossyField {
     type Incident = SampleSet;
     type Exitant = Haar;
 
-    fn active(&self, material: u32) -> Option<f32> {
+    fn active(&self, material: u32) -> Option<Rgb> {
         self.material(Some(material)).map(|m| m.albedo)
     }
 
@@ -148,7 +163,7 @@ impl LightField for GlossyField {
         incident.push(IlluminationSample::new(transfer));
     }
 
-    fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], diffuse: Rgb) -> Haar {
+    fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], arrived: Arrived) -> Haar {
         let Some(material) = self.material(hierarchy.material(leaf)) else { return Haar::default() };
         let place = Place::new(hierarchy.center(leaf), hierarchy.normals(leaf).axis);
         let mut incident = Vec::new();
@@ -156,6 +171,7 @@ impl LightField for GlossyField {
         if incident.is_empty() {
             return Haar::default();
         }
+        balance(&mut incident, arrived.irradiance);
         merge_weak(&mut incident);
         // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
         let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
@@ -171,7 +187,7 @@ impl LightField for GlossyField {
                 cone: Cone { axis: place.normal(), cos_angle: 1e-3 },
                 beyond: if flat { Beyond::Continued } else { Beyond::Zero },
             }),
-            offset: diffuse,
+            offset: arrived.diffuse,
             peaks: &peaks(material, &incident, &place),
         };
         let projected = Haar::project(&self.refinement, &known, |direction| {
@@ -183,7 +199,14 @@ impl LightField for GlossyField {
         let evaluations = projected.evaluations as u64 * incident.len() as u64;
         self.counters.evaluations.fetch_add(evaluations, Ordering::Relaxed);
         self.counters.samples.fetch_add(incident.len() as u64, Ordering::Relaxed);
-        projected.haar
+        let mut haar = projected.haar;
+        // A projection that overestimates a narrow lobe would let mirrors facing each other shine without end.
+        let power = if flat { haar.cosine_integral(place.normal()) } else { haar.integral() }.element_sum();
+        let most = MOST_GAIN * (material.albedo * arrived.irradiance).element_sum();
+        if power > most {
+            haar.scale(most / power);
+        }
+        haar
     }
 
     fn pull<H: Hierarchy>(&self, hierarchy: &H, parent: NodeId, children: &[Haar]) -> Haar {

@@ -181,8 +181,8 @@ impl obvhs::Boundable for Boxed {
 
 impl Elements {
     /// Builds clusters and one element per surface and reflecting side. `extra` tells how much an extension
-    /// reflects of a material beside the diffuse part (largest channel); `None` where it takes no part.
-    pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<f32>) -> Self {
+    /// reflects of a material beside the diffuse part; `None` where it takes no part.
+    pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<Rgb>) -> Self {
         let mut roots: Vec<Element> = Vec::new();
         for i in 0..scene.surfaces().len() {
             let material = &scene.materials[scene.surface_materials[i] as usize];
@@ -335,7 +335,7 @@ const EMPTY: Element = Element {
 };
 
 /// An element for a part of a surface.
-fn patch(scene: &SceneData, surface: u32, kind: Kind, domain: Domain, glossy: Option<f32>) -> Element {
+fn patch(scene: &SceneData, surface: u32, kind: Kind, domain: Domain, glossy: Option<Rgb>) -> Element {
     let geometry = &scene.surfaces()[surface as usize];
     let bounds = geometry.bounds(domain);
     let (low, high) = (bounds.min, bounds.max);
@@ -363,7 +363,7 @@ fn patch(scene: &SceneData, surface: u32, kind: Kind, domain: Domain, glossy: Op
         material: scene.surface_materials[surface as usize],
         domain,
         reflectance,
-        importance: reflectance.max_element() + glossy.unwrap_or(0.0),
+        importance: (reflectance + glossy.unwrap_or(Rgb::ZERO)).max_element(),
         active: glossy.is_some(),
         whole_sphere: geometry.sphere().is_some() && domain == Domain::WHOLE && geometry.is_convex(kind == Kind::Back),
         convex: geometry.is_convex(kind == Kind::Back),

@@ -83,6 +83,15 @@ pub struct Transfer {
     pub oriented: bool,
 }
 
+/// What a leaf received in all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrived {
+    /// Mean irradiance, W/m².
+    pub irradiance: Rgb,
+    /// Diffuse radiance that the leaf makes of it, W/(m² sr).
+    pub diffuse: Rgb,
+}
+
 /// What light does besides being diffuse radiosity. `()` is the purely diffuse engine, at no cost.
 pub trait LightField: Sync {
     /// What the extension keeps of a node's incident light. The default is "nothing here".
@@ -90,18 +99,24 @@ pub trait LightField: Sync {
     /// What it keeps of a node's exitant light. The default is "nothing here".
     type Exitant: Default + Send + Sync;
 
-    /// What surfaces of this material reflect beside the diffuse part (largest channel of a reflectance, 0…1), or
-    /// `None` where they do not take part. Nodes without any active surface below them are never visited.
-    fn active(&self, material: u32) -> Option<f32>;
+    /// What surfaces of this material reflect beside the diffuse part (a reflectance, 0…1 per channel), or `None`
+    /// where they do not take part. Nodes without any active surface below them are never visited. An engine may
+    /// carry the light of materials that reflect next to nothing this way as diffuse light until it is shown.
+    fn active(&self, material: u32) -> Option<Rgb>;
     /// Forgets a node's incident light, before links are gathered anew.
     fn clear(&self, incident: &mut Self::Incident);
     /// Takes one link's light at its receiver, which may be a leaf, an inner element or a cluster.
     fn receive(&self, incident: &mut Self::Incident, transfer: &Transfer);
     /// A leaf's exitant light from its incident light. `path` holds that of all nodes from the root down to the
-    /// leaf itself, which comes last. `diffuse` is the leaf's diffuse radiance, beside which glossy detail may be
-    /// negligible.
-    fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&Self::Incident], diffuse: Rgb)
-    -> Self::Exitant;
+    /// leaf itself, which comes last. `arrived` is the leaf's irradiance and its diffuse radiance: what the incident
+    /// light adds up to, and what glossy detail may be negligible beside.
+    fn reflect<H: Hierarchy>(
+        &self,
+        hierarchy: &H,
+        leaf: NodeId,
+        path: &[&Self::Incident],
+        arrived: Arrived,
+    ) -> Self::Exitant;
     /// The children's exitant light averaged, weighted by area. `children` are in the order of
     /// `hierarchy.children(parent)`.
     fn pull<H: Hierarchy>(&self, hierarchy: &H, parent: NodeId, children: &[Self::Exitant]) -> Self::Exitant;
@@ -117,12 +132,12 @@ impl LightField for () {
     type Incident = ();
     type Exitant = ();
 
-    fn active(&self, _: u32) -> Option<f32> {
+    fn active(&self, _: u32) -> Option<Rgb> {
         None
     }
     fn clear(&self, (): &mut ()) {}
     fn receive(&self, (): &mut (), _: &Transfer) {}
-    fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], _: Rgb) {}
+    fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], _: Arrived) {}
     fn pull<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[()]) {}
     fn radiance(&self, (): &(), _: Vec3) -> Rgb {
         Rgb::ZERO

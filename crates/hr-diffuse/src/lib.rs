@@ -28,7 +28,7 @@ pub mod visibility;
 pub use cone::Cone;
 pub use error::SolveError;
 pub use geometry::{Aabb, Domain, Geometry, GeometryError, Normalization};
-pub use hooks::{Hierarchy, LightField, NodeId, Transfer};
+pub use hooks::{Arrived, Hierarchy, LightField, NodeId, Transfer};
 pub use scene::{DiffuseMaterial, Light, LightKind, SceneInput, Shape, Surface, SurfaceReflectance};
 pub use solution::Solution;
 pub use solver::{Phase, Progress, Settings, Solver};

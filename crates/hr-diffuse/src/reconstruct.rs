@@ -263,7 +263,7 @@ fn gather_at<L: LightField>(
     let element = light.element(leaf);
     let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET));
-    let mut arriving: SmallVec<[(Rgb, f32, u32); 256]> = SmallVec::new();
+    let mut arriving: SmallVec<[(Rgb, f32, u32); 128]> = SmallVec::new();
     let mut total = 0.0;
     let mut node = leaf;
     loop {
@@ -280,7 +280,7 @@ fn gather_at<L: LightField>(
         }
         node = light.element(node).parent;
     }
-    let (mut sum, mut rays) = (Rgb::ZERO, 0);
+    let (mut sum, mut rays, mut row) = (Rgb::ZERO, 0, 0.0);
     let seed = hash(seed, 0x51ed);
     for (irradiance, mut visibility, sender) in arriving {
         let share = irradiance.max_element() / total;
@@ -291,6 +291,8 @@ fn gather_at<L: LightField>(
             visibility = visibility_at(light, (x, n, element.source), sender, count, seed);
         }
         sum += irradiance * visibility.abs();
+        row += light.share_at(x, n, sender) * visibility.abs();
     }
-    (sum, rays)
+    // Senders in one plane hide each other by turns: together they are no more than all there is to see.
+    (sum / row.max(1.0), rays)
 }

@@ -12,6 +12,7 @@ use crate::segments;
 use crate::stats::Skipped;
 use crate::transport::{Exitant, Light};
 use crate::geometry::Domain;
+use crate::Rgb;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
@@ -153,6 +154,7 @@ pub(crate) struct MutableLight<'a, L: LightField> {
     pub(crate) exitant: &'a mut Exitant,
     pub(crate) field: &'a L,
     pub(crate) reflected: &'a mut Vec<L::Exitant>,
+    pub(crate) faint: &'a [Rgb],
 }
 
 impl<L: LightField> MutableLight<'_, L> {
@@ -191,7 +193,7 @@ fn split_elements<L: LightField>(
                 } else {
                     Vec3::ZERO
                 };
-                let own = emitted + exitant.irradiance[parent] * element.reflectance;
+                let own = emitted + exitant.irradiance[parent] * (element.reflectance + light.faint[element.material as usize]);
                 exitant.radiosity.push(own);
                 exitant.range.push([own, own]);
                 exitant.direction.push(element.mean_normal);

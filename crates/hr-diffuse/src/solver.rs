@@ -3,7 +3,7 @@
 use crate::error::SolveError;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
-use crate::hooks::{Hierarchy, LightField, NodeId, Transfer};
+use crate::hooks::{Arrived, Hierarchy, LightField, NodeId, Transfer};
 use crate::links::Links;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::stats::Stats;
@@ -12,6 +12,7 @@ use crate::visibility::Visibility;
 use crate::{LightKind, Rgb, SceneInput};
 use glam::Vec3;
 use rayon::prelude::*;
+use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -22,6 +23,9 @@ const LINK_SHARE: f32 = 0.05;
 const SMALLEST_SHARE: f32 = 0.008;
 /// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
 const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
+/// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
+/// diffuse light until it is shown.
+const FAINT_SHARE: f32 = 0.5;
 /// A leaf's light is reflected anew once its irradiance has changed by this share of the error asked for.
 const REFLECT_SHARE: f32 = 0.5;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
@@ -86,6 +90,9 @@ pub struct Solver<L: LightField = ()> {
     transfers: Vec<Vec<Transfer>>,
     /// What each leaf's own place makes of the light that its ancestors' links carry, as a factor.
     placed: Vec<f32>,
+    /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
+    /// diffuse light.
+    faint: Vec<Rgb>,
     /// Irradiance of each leaf when its light was last reflected by the extension.
     last_reflected: Vec<Rgb>,
     /// Area whose light counts.
@@ -104,6 +111,11 @@ impl<L: LightField> Solver<L> {
             return Err(SolveError::Error { error: settings.error });
         }
         let scene = scene_data(input)?;
+        let faint = (0..scene.materials.len() as u32).map(|material| match field.active(material) {
+            Some(albedo) if albedo.max_element() <= FAINT_SHARE * settings.error => albedo,
+            _ => Rgb::ZERO,
+        });
+        let faint: Vec<Rgb> = faint.collect();
         let elements = Elements::build(&scene, |material| field.active(material));
         let count = elements.nodes.len();
         let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
@@ -128,6 +140,7 @@ impl<L: LightField> Solver<L> {
             own: Vec::new(),
             transfers: Vec::new(),
             placed: Vec::new(),
+            faint,
             last_reflected: Vec::new(),
             area,
         };
@@ -190,6 +203,7 @@ impl<L: LightField> Solver<L> {
             exitant: &mut self.exitant,
             field: &self.field,
             reflected: &mut self.reflected,
+            faint: &self.faint,
         };
         let mut wave_number = 0.0_f32;
         let refined = refine(&mut light, links, unlit, tolerance, &mut |wave, done| {
@@ -221,7 +235,7 @@ impl<L: LightField> Solver<L> {
         self.gather();
         self.push();
         let middle = Instant::now();
-        let changed = self.reflect();
+        let changed = self.reflect(false);
         self.pull_reflected(&changed);
         let end = Instant::now();
         self.pull();
@@ -240,6 +254,15 @@ impl<L: LightField> Solver<L> {
         self.stats.iterations += 1;
         self.stats.residuals.push(residual);
         residual
+    }
+
+    /// Reflects the incident light of all leaves once more, of those too whose glossy part was carried as diffuse
+    /// light: the final reflection of all accumulated samples (paper, section 3.4), for display by distributions.
+    pub fn reflect_for_display(&mut self) {
+        let start = Instant::now();
+        let changed = self.reflect(true);
+        self.pull_reflected(&changed);
+        self.stats.seconds.reflect += start.elapsed().as_secs_f64();
     }
 
     /// Read access to hierarchy and exitant light.
@@ -331,7 +354,8 @@ impl<L: LightField> Solver<L> {
 
     /// Form factors are means over the element that a link ends at; a leaf in a corner of it sees more or less.
     /// Compares the light that arrives at each leaf's middle with what was pushed down to it. In an enclosure
-    /// this makes every leaf's form factors sum to 1, whichever ancestors hold its links.
+    /// this makes every leaf's form factors sum to 1, whichever ancestors hold its links; nowhere do they sum to more,
+    /// so that light dies out wherever reflectances are below 1.
     fn place(&mut self) {
         let start = Instant::now();
         let (elements, light) = (&self.elements, self.light());
@@ -341,18 +365,18 @@ impl<L: LightField> Solver<L> {
             .with_min_len(16)
             .map(|&leaf| {
                 let element = light.element(leaf);
-                let normal = element.mean_normal.normalize_or_zero();
-                if !element.is_flat() || normal == Vec3::ZERO {
-                    return 1.0;
-                }
-                let (mut exact, mut pushed) = (0.0, 0.0);
+                let points = sample_points(&self.scene, element);
+                let (mut exact, mut pushed, mut row) = (0.0, 0.0, 0.0);
                 let mut node = leaf;
                 loop {
                     let receiver = light.element(node);
                     for link in self.links.of(node) {
                         let visible = link.visibility.abs();
                         if visible > 0.0 {
-                            exact += visible * light.irradiance_at(element.center, normal, link.sender).element_sum();
+                            for &(x, n, weight) in &points {
+                                exact += visible * weight * light.irradiance_at(x, n, link.sender).element_sum();
+                                row += visible * weight * light.share_at(x, n, link.sender);
+                            }
                             let direction = light.direction_to(receiver.center, link.sender);
                             let carried = light.emitted(link.sender, -direction).element_sum() * link.factor * visible;
                             pushed += if receiver.is_flat() {
@@ -374,7 +398,9 @@ impl<L: LightField> Solver<L> {
                     }
                     node = receiver.parent;
                 }
-                if pushed > 0.0 && exact > 0.0 { (exact / pushed).clamp(0.25, 4.0) } else { 1.0 }
+                // Surfaces that lie in one another's plane hide each other by turns, which no ray can tell.
+                let placed = if pushed > 0.0 && exact > 0.0 { (exact / pushed).clamp(0.25, 4.0) } else { 1.0 };
+                placed / row.max(1.0)
             })
             .collect();
         self.placed.clear();
@@ -387,14 +413,18 @@ impl<L: LightField> Solver<L> {
 
     /// The extension turns the incident light of its leaves into exitant light.
     /// Tells which leaves changed.
-    fn reflect(&mut self) -> Vec<u32> {
+    fn reflect(&mut self, faint_too: bool) -> Vec<u32> {
         let elements = &self.elements;
         if !elements.nodes[0].active {
             return Vec::new();
         }
         let tolerance = REFLECT_SHARE * self.settings.error;
         self.last_reflected.resize(elements.nodes.len(), Rgb::splat(f32::NEG_INFINITY));
-        let leaves: Vec<u32> = elements.patch_leaves().filter(|&l| elements.nodes[l as usize].active).collect();
+        let strong = |leaf: &u32| {
+            let element = &elements.nodes[*leaf as usize];
+            element.active && (faint_too || self.faint[element.material as usize] == Rgb::ZERO)
+        };
+        let leaves: Vec<u32> = elements.patch_leaves().filter(strong).collect();
         let all = leaves.len() as u64;
         let leaves: Vec<u32> = leaves
             .into_iter()
@@ -416,8 +446,9 @@ impl<L: LightField> Solver<L> {
                 }
                 path.reverse();
                 let element = &elements.nodes[leaf as usize];
-                let diffuse = self.exitant.irradiance[leaf as usize] * element.reflectance / std::f32::consts::PI;
-                self.field.reflect(elements, NodeId(leaf), &path, diffuse)
+                let irradiance = self.exitant.irradiance[leaf as usize];
+                let diffuse = irradiance * element.reflectance * std::f32::consts::FRAC_1_PI;
+                self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse })
             })
             .collect();
         for (&leaf, exitant) in leaves.iter().zip(exitant) {
@@ -490,7 +521,8 @@ impl<L: LightField> Solver<L> {
             if element.child_count == 0 {
                 let material = &self.scene.materials[element.material as usize];
                 let emitted = if element.kind == Kind::Front { material.exitance } else { Rgb::ZERO };
-                let radiosity = emitted + exitant.irradiance[node] * element.reflectance;
+                let reflectance = element.reflectance + self.faint[element.material as usize];
+                let radiosity = emitted + exitant.irradiance[node] * reflectance;
                 exitant.radiosity[node] = radiosity;
                 exitant.range[node] = [radiosity, radiosity];
                 exitant.direction[node] = element.mean_normal;
@@ -581,6 +613,17 @@ pub(crate) fn renewed<L: LightField>(light: Light<'_, L>, transfer: &Transfer, a
     let now = at.distance_squared(sender.center);
     // Near large senders the inverse square law ends; a factor of four is more than refinement leaves.
     (direction, (before / now.max(1e-12)).clamp(0.25, 4.0))
+}
+
+/// Points, normals and weights (sum 1) that stand for a leaf: its middle where it is flat, four of a curved one.
+fn sample_points(scene: &SceneData, element: &crate::hierarchy::Element) -> SmallVec<[(Vec3, Vec3, f32); 4]> {
+    if element.is_flat() {
+        return smallvec![(element.center, element.normals.axis, 1.0)];
+    }
+    let geometry = &scene.surfaces()[element.source as usize];
+    let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
+    let points = geometry.quadrature(element.domain);
+    points.into_iter().map(|(uv, weight)| (geometry.point(uv), geometry.normal(uv) * side, weight)).collect()
 }
 
 /// Share of the work done: each pass costs a few times the one before.

@@ -174,6 +174,20 @@ impl<L: LightField> Light<'_, L> {
         }
     }
 
+    /// Share of its view (cosine-weighted hemisphere) that a sender takes up at a point with normal `n`, if nothing
+    /// is in between: the shares of what a point really sees never sum to more than 1. 0 for lights without extent.
+    #[must_use]
+    pub(crate) fn share_at(&self, x: Vec3, n: Vec3, sender: u32) -> f32 {
+        let element = self.element(sender);
+        match element.kind {
+            Kind::Light => 0.0,
+            Kind::Cluster => {
+                self.factor_at(x, n, sender) * element.mean_cosine((x - element.center).normalize_or_zero())
+            }
+            Kind::Front | Kind::Back => self.factor_at(x, n, sender),
+        }
+    }
+
     /// Unoccluded irradiance at a point with normal `n` from a sender. Clusters and unevenly lit surfaces that are
     /// near are resolved into their parts.
     #[must_use]

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::{GlossyField, Incident, Place, Reflector, arriving};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2, unit};
-use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
+use hr_diffuse::{Hierarchy, Hit, LightField, NodeId, Rgb, Solution};
 use hr_scene::{Camera, Image, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
@@ -142,7 +142,13 @@ impl<'a> RayCaster<'a> {
     /// Glossy radiance from a leaf's distribution.
     fn leaving(&self, leaf: NodeId, away: Vec3) -> Rgb {
         let element = &self.solution.elements.nodes[leaf.index()];
-        let light = self.solution.reflected[leaf.index()].eval(away);
+        let distribution = &self.solution.reflected[leaf.index()];
+        if distribution.is_empty() {
+            // Carried as diffuse light.
+            let albedo = self.solution.field.active(element.material).unwrap_or(Rgb::ZERO);
+            return self.solution.exitant.irradiance[leaf.index()] * albedo * FRAC_1_PI;
+        }
+        let light = distribution.eval(away);
         if element.is_flat() {
             light
         } else {

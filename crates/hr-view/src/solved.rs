@@ -17,7 +17,8 @@ pub struct Solved {
 }
 
 impl Solved {
-    /// Solves for the light in a scene. `watch` is told how far it is; once it breaks, what there is is finished
+    /// Solves for the light in a scene; makes the distributions of all glossy leaves where they are to be shown.
+    /// `watch` is told how far it is; once it breaks, what there is is finished
     /// without refining any more.
     ///
     /// # Errors
@@ -25,11 +26,15 @@ impl Solved {
     pub fn new(
         scene: Arc<Scene>,
         settings: Settings,
+        distributions: bool,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, SolveError> {
         let field = GlossyField::new(&scene.reflectors(), Refinement::default());
         let mut solver = Solver::new(&scene.input(), settings, field)?;
         solver.solve(watch);
+        if distributions {
+            solver.reflect_for_display();
+        }
         let solution = solver.finish(watch);
         Ok(Self { scene, solution })
     }

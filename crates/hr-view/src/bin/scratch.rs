@@ -5,7 +5,7 @@ fn main() {
     let scene = Arc::new(Scene::load(&a[1]).unwrap());
     for w in &scene.warnings { println!("warn {} {} x{}", w.text, w.first, w.count); }
     let t = Instant::now();
-    let s = solved::Solved::new(scene.clone(), hr_diffuse::Settings { error: a[2].parse().unwrap() }, &mut |p| { if std::env::var("PR").is_ok() { eprintln!("{:.1}s {p:?}", t.elapsed().as_secs_f64()); } ControlFlow::Continue(()) }).unwrap();
+    let s = solved::Solved::new(scene.clone(), hr_diffuse::Settings { error: a[2].parse().unwrap() }, std::env::var("ND").is_err(), &mut |p| { if std::env::var("PR").is_ok() { eprintln!("{:.1}s {p:?}", t.elapsed().as_secs_f64()); } ControlFlow::Continue(()) }).unwrap();
     println!("solve {:.2}s {:?}", t.elapsed().as_secs_f64(), s.solution.stats);
     let basis: usize = s.solution.reflected.iter().map(|h| h.basis_functions()).sum();
     let bytes: usize = s.solution.reflected.iter().map(|h| h.bytes()).sum();
