@@ -1,7 +1,8 @@
 //! Scenes whose answer is known in closed form.
 
 use glam::{DVec3, Vec3};
-use hr_diffuse::{DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solution, Solver, Surface};
+use hr_diffuse::{DiffuseMaterial, Light, LightKind, Rgb, SceneInput, Settings, Shape, Solution, Solver, Surface};
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 fn solve(input: &SceneInput, error: f32) -> Solution {
@@ -18,8 +19,12 @@ fn cube(side: f64) -> Vec<Surface> {
             let n = DVec3::AXES[axis] * -sign;
             let (u, v) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
             let c = n * (-side / 2.0);
-            let mut corners = [c - u * side / 2.0 - v * side / 2.0, c + u * side / 2.0 - v * side / 2.0,
-                c + u * side / 2.0 + v * side / 2.0, c - u * side / 2.0 + v * side / 2.0];
+            let mut corners = [
+                c - u * side / 2.0 - v * side / 2.0,
+                c + u * side / 2.0 - v * side / 2.0,
+                c + u * side / 2.0 + v * side / 2.0,
+                c - u * side / 2.0 + v * side / 2.0,
+            ];
             if sign > 0.0 {
                 corners.reverse();
             }
@@ -32,11 +37,8 @@ fn cube(side: f64) -> Vec<Surface> {
 /// B = ed / (1 − ρ) everywhere in a closed room whose walls all emit and reflect alike.
 #[test]
 fn furnace_has_its_analytic_radiosity() {
-    let material = DiffuseMaterial {
-        reflectance: Rgb::new(0.2, 0.5, 0.8),
-        exitance: Rgb::new(1.0, 2.0, 3.0),
-        two_sided: true,
-    };
+    let material =
+        DiffuseMaterial { reflectance: Rgb::new(0.2, 0.5, 0.8), exitance: Rgb::new(1.0, 2.0, 3.0), two_sided: true };
     let input = SceneInput { surfaces: cube(2.0), materials: vec![material], ..SceneInput::default() };
     let solution = solve(&input, 0.05);
     let exact = material.exitance / (Vec3::ONE - material.reflectance);
@@ -49,11 +51,101 @@ fn furnace_has_its_analytic_radiosity() {
         }
     }
     let mean = sum / area;
-    println!("{:?} leaves {} links {} mean {mean} exact {exact}", solution.stats, solution.stats.leaves, solution.stats.links);
     let error = ((mean - exact) / exact).abs().max_element();
     assert!(error < 0.01, "mean radiosity {mean} against {exact}");
-    let worst = solution.vertices.irradiance.iter().map(|&e| {
-        (material.exitance + material.reflectance * e - exact).abs().max_element() / exact.max_element()
-    });
-    let _ = worst;
+}
+
+/// A grey plate (material 0, the first surface) and black senders of exitance 1 (material 1).
+fn lit_plate(plate: [DVec3; 4], senders: Vec<Shape>) -> SceneInput {
+    let mut surfaces = vec![Surface::new(Shape::Quad(plate), 0)];
+    surfaces.extend(senders.into_iter().map(|shape| Surface::new(shape, 1)));
+    let plate = DiffuseMaterial { reflectance: Rgb::splat(0.5), exitance: Rgb::ZERO, two_sided: false };
+    let sender = DiffuseMaterial { reflectance: Rgb::ZERO, exitance: Rgb::ONE, two_sided: false };
+    SceneInput { surfaces, materials: vec![plate, sender], ..SceneInput::default() }
+}
+
+/// The unit square in z = 0 that looks up.
+const FLOOR: [DVec3; 4] = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+
+/// Mean irradiance on the front of the first surface.
+fn plate_irradiance(input: &SceneInput, error: f32) -> f64 {
+    let solution = solve(input, error);
+    f64::from(solution.exitant.irradiance[solution.elements.surface_nodes[0][0] as usize].x)
+}
+
+/// Nothing else sends, so the whole error asked for belongs to this one transfer.
+#[track_caller]
+fn assert_irradiance(input: &SceneInput, exact: f64, what: &str) {
+    for error in [0.1, 0.02] {
+        let found = plate_irradiance(input, error);
+        let off = (found / exact - 1.0).abs();
+        assert!(off < f64::from(error), "{what}: {found} instead of {exact}, {:.2} % off", 100.0 * off);
+    }
+}
+
+/// Two unit squares face each other at distance 1 (E. Sparrow and R. Cess, Radiation Heat Transfer, 1978; the closed
+/// form for a = b = c).
+#[test]
+fn parallel_plates_have_their_form_factor() {
+    let r2 = 2.0_f64.sqrt();
+    let exact = 2.0 / PI * ((4.0_f64 / 3.0).sqrt().ln() + 2.0 * r2 * (1.0 / r2).atan() - 2.0 * 1.0_f64.atan());
+    assert!((exact - 0.199_825).abs() < 1e-6, "the tabulated value: {exact}");
+    let above = FLOOR.map(|p| p + DVec3::Z);
+    let lamp = Shape::Quad([above[0], above[3], above[2], above[1]]);
+    assert_irradiance(&lit_plate(FLOOR, vec![lamp]), exact, "parallel");
+}
+
+/// Two unit squares at a right angle share an edge: F = 0.200044 (the same source, w = h = 1), where 1/r² has its pole.
+#[test]
+fn perpendicular_plates_have_their_form_factor() {
+    let wall = Shape::Quad([DVec3::ZERO, DVec3::Y, DVec3::new(0.0, 1.0, 1.0), DVec3::Z]);
+    assert_irradiance(&lit_plate(FLOOR, vec![wall]), 0.200_044, "perpendicular");
+}
+
+/// Solid angle of the unit square seen from height h above its middle: that of a right pyramid.
+fn solid_angle(h: f64) -> f64 {
+    4.0 * (1.0 / (4.0 * h * h + 1.0)).asin()
+}
+
+/// A sphere that does not cross the plate's plane acts through the plate's solid angle alone: F = Ω/4π from the sphere
+/// (A. Feingold and K. Gupta, Journal of Heat Transfer 92, 1970), so E = B·4πr²·Ω/4π over area 1.
+#[test]
+fn a_sphere_has_its_form_factor() {
+    let sphere = Shape::Sphere { center: DVec3::new(0.5, 0.5, 0.75), radius: 0.25 };
+    assert_irradiance(&lit_plate(FLOOR, vec![sphere]), 0.0625 * solid_angle(0.75), "sphere");
+}
+
+/// A point light of 3 W/sr sends 3·Ω W onto the plate; distant light of 3 W/m² at 60° makes 1.5 W/m².
+#[test]
+fn lights_without_extent_make_their_irradiance() {
+    let light = |kind| Light { position: DVec3::new(0.5, 0.5, 0.75), intensity: Rgb::splat(3.0), kind };
+    let with = |light| SceneInput { lights: vec![light], ..lit_plate(FLOOR, vec![]) };
+    assert_irradiance(&with(light(LightKind::Point)), 3.0 * solid_angle(0.75), "point");
+    let direction = Vec3::new(0.75_f32.sqrt(), 0.0, -0.5);
+    assert_irradiance(&with(light(LightKind::Directional { direction })), 1.5, "distant");
+}
+
+/// Half of a plate lies under a roof that reaches to its middle; distant light from straight above sees the other half.
+#[test]
+fn a_roof_over_half_the_plate_takes_half_the_light() {
+    let roof = [(0.5, 0.0), (0.5, 1.0), (-1.0, 1.0), (-1.0, 0.0)].map(|(x, y)| DVec3::new(x, y, 0.25));
+    let kind = LightKind::Directional { direction: -Vec3::Z };
+    let light = Light { position: DVec3::ZERO, intensity: Rgb::ONE, kind };
+    let mut input = lit_plate(FLOOR, vec![Shape::Quad(roof)]);
+    input.materials[1].exitance = Rgb::ZERO;
+    input.lights.push(light);
+    assert_irradiance(&input, 0.5, "half");
+}
+
+/// Not a trace of light passes through a wall, at any height.
+#[test]
+fn nothing_passes_through_a_wall() {
+    let sheet = |z: f64| FLOOR.map(|p| DVec3::new(5.0 * p.x - 2.0, 5.0 * p.y - 2.0, z));
+    for z in [0.01, 0.5, 0.99] {
+        let lamp = FLOOR.map(|p| p + DVec3::Z);
+        let mut input = lit_plate(FLOOR, vec![Shape::Quad([lamp[0], lamp[3], lamp[2], lamp[1]])]);
+        input.surfaces.push(Surface::new(Shape::Quad(sheet(z)), 2));
+        input.materials.push(DiffuseMaterial { reflectance: Rgb::ZERO, exitance: Rgb::ZERO, two_sided: true });
+        assert_eq!(plate_irradiance(&input, 0.1), 0.0, "under a sheet at height {z}");
+    }
 }
