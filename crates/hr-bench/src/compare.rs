@@ -71,8 +71,7 @@ pub fn compare(
     if not_finite > 0 {
         return wrong(format!("{not_finite} pixels are infinite or NaN"));
     }
-    let kept: Vec<bool> =
-        reference.pixels.iter().enumerate().map(|(i, &p)| luminance(p) > 0.0 && keep(i, p)).collect();
+    let kept: Vec<bool> = reference.pixels.iter().enumerate().map(|(i, &p)| luminance(p) > 0.0 && keep(i, p)).collect();
     let sum = |channels: Rgb| channels.as_dvec3().element_sum();
     let (mut total, mut ours, mut pixel, mut explained) = (0.0, 0.0, 0.0, 0.0);
     for i in (0..kept.len()).filter(|&i| kept[i]) {

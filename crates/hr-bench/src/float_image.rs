@@ -45,7 +45,8 @@ fn pfm(mut bytes: &[u8]) -> Result<Image, Fault> {
         return Err(("its header is broken".into(), mend));
     };
     let little = scale < 0.0;
-    let values = bytes.as_chunks::<4>().0.iter().map(|&b| if little { f32::from_le_bytes(b) } else { f32::from_be_bytes(b) });
+    let values =
+        bytes.as_chunks::<4>().0.iter().map(|&b| if little { f32::from_le_bytes(b) } else { f32::from_be_bytes(b) });
     let mut image = image([height as usize, width as usize], values.collect())?;
     let rows: Vec<Rgb> = image.pixels.rchunks_exact(image.width as usize).flatten().copied().collect();
     image.pixels = rows;
@@ -152,7 +153,15 @@ mod tests {
             let (what, _) = npy(&bytes).expect_err(hint);
             assert!(what.contains(hint), "'{what}' should say '{hint}'");
         }
-        for text in ["", "P6\n1 1\n255\n", "PF\n1 1\n", "PF\n1 x\n-1\n", "PF\n1 1\n-1\nshort", "PF\n-1 1\n-1\n", "PF 9e99 1 -1 "] {
+        for text in [
+            "",
+            "P6\n1 1\n255\n",
+            "PF\n1 1\n",
+            "PF\n1 x\n-1\n",
+            "PF\n1 1\n-1\nshort",
+            "PF\n-1 1\n-1\n",
+            "PF 9e99 1 -1 ",
+        ] {
             assert!(pfm(text.as_bytes()).is_err(), "'{text}' is no image");
         }
     }

@@ -1,7 +1,7 @@
 //! A reference path tracer, to measure solutions by: unbiased, on the exact surfaces, and with nothing of hierarchical
 //! radiosity in it but its rays and its reflectors.
 //!
-//! At every point of a path one emitter is drawn for direct light, and one part of the BRDF (its Lambertian share, its
+//! At every point of a path one emitter is picked for direct light, and one part of the BRDF (its Lambertian share, its
 //! glossy part or its mirror) for the path to go on. Emitters that both find are weighted by the power heuristic
 //! (Veach & Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", SIGGRAPH 1995). Its weights
 //! for the two add up to 1 for *any* positive functions in place of the densities, so that the glossy part's density,
@@ -40,6 +40,11 @@ const SURE_BOUNCES: u32 = 3;
 const MOST_SURVIVAL: f32 = 0.95;
 /// A glossy part is drawn with at least this albedo: that of a remainder may be 0 in the mean only.
 const LEAST_ALBEDO: f32 = 0.05;
+/// Emitters among which one is picked at each point of a path.
+const CANDIDATES: u32 = 4;
+/// Step from one candidate's place on its emitter to the next one's: the two-dimensional golden ratio, as in
+/// [`hr_diffuse::sampling`].
+const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
 /// Side of the grid of rays that look for emitters in a pixel.
 const LOOKS: u32 = 4;
 
@@ -108,7 +113,7 @@ impl PathTracer {
                 Geometry::from_surface(s, &normalization).map_err(|source| BenchError::Surface { surface, source })
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let emitters = Emitters::new(&scene, &geometries, &normalization);
+        let emitters = Emitters::new(&scene, &geometries, &normalization, CANDIDATES);
         let albedo = |reflector: &Arc<dyn Reflector>| {
             if reflector.is_diffuse() { 0.0 } else { reflector.glossy_albedo().max_element().max(LEAST_ALBEDO) }
         };
@@ -203,14 +208,14 @@ impl PathTracer {
             }
             let Some(point) = self.point(&hit, direction) else { break };
             let pair = |i: u32| sampler.pair(1 + bounce * PAIRS + i);
-            let (choices, place, turn) = (pair(0), pair(1), pair(2));
-            light += throughput * self.direct(&point, choices.x, place);
+            let (choices, place, turn, chance) = (pair(0), pair(1), pair(2), pair(3));
+            light += throughput * self.direct(&point, choices.x, place, chance.x);
             let Some(step) = point.step(choices.y, turn) else { break };
             throughput *= step.weight;
             if bounce + 1 >= SURE_BOUNCES {
                 // A remainder beside the Lambertian share may be negative, and so may be its paths.
                 let survival = throughput.abs().max_element().min(MOST_SURVIVAL);
-                if pair(3).x >= survival {
+                if chance.y >= survival {
                     break;
                 }
                 throughput /= survival;
@@ -247,8 +252,7 @@ impl PathTracer {
         let away = -direction;
         let shading = self.shading_normal(hit) * side;
         let facing = shading.dot(away);
-        let normal =
-            if facing >= GRAZING { shading } else { (shading + away * (GRAZING - facing)).normalize_or(away) };
+        let normal = if facing >= GRAZING { shading } else { (shading + away * (GRAZING - facing)).normalize_or(away) };
         let true_normal = hit.normal * side;
         // Without shading normals the true one is right also at grazing directions.
         let flat = self.scene.surfaces[hit.surface as usize].shading_normals.is_none();
@@ -274,17 +278,35 @@ impl PathTracer {
         normal.try_normalize().unwrap_or(hit.normal)
     }
 
-    /// Radiance that a point reflects of the light of one emitter, drawn with its density.
-    fn direct(&self, point: &Point, choice: f32, place: Vec2) -> Rgb {
+    /// Radiance that a point reflects of the light of one emitter. It is picked from a few candidates by what they
+    /// would send were nothing between, so that near lamps win over strong ones (Talbot, Cline, Egbert, "Importance
+    /// Resampling for Global Illumination", EGSR 2005); the candidates are stratified by power.
+    fn direct(&self, point: &Point, choice: f32, place: Vec2, pick: f32) -> Rgb {
         let geometries = self.visibility.geometries();
-        let Some(arrival) = self.emitters.draw(geometries, point.position, choice, place) else { return Rgb::ZERO };
-        let reflected = point.reflected(&arrival);
-        if reflected == Rgb::ZERO {
-            return Rgb::ZERO;
+        let (mut best, mut total) = (None, 0.0);
+        let mut pick = pick;
+        for i in 0..CANDIDATES {
+            let (choice, place) = ((choice + i as f32) / CANDIDATES as f32, (place + STEP * i as f32).fract());
+            let Some(arrival) = self.emitters.draw(geometries, point.position, choice, place) else { continue };
+            let light = point.reflected(&arrival) * arrival.irradiance;
+            let strength = light.abs().element_sum();
+            if strength > 0.0 {
+                // One of several in one pass: the new one replaces the old one by its share of the sum so far, and what
+                // is left of the random number serves the next.
+                total += strength;
+                let share = strength / total;
+                if pick < share {
+                    best = Some((arrival, light / strength));
+                    pick /= share;
+                } else {
+                    pick = (pick - share) / (1.0 - share);
+                }
+            }
         }
+        let Some((arrival, light)) = best else { return Rgb::ZERO };
         let ends = [point.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
         let blocked = self.visibility.occluded(point.position, arrival.from, ends, &mut { NO_BLOCKER });
-        if blocked { Rgb::ZERO } else { reflected * arrival.irradiance }
+        if blocked { Rgb::ZERO } else { light * (total / CANDIDATES as f32) }
     }
 }
 

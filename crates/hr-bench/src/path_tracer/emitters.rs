@@ -25,6 +25,8 @@ struct Entry {
     source: Source,
     /// Chance to be drawn.
     chance: f32,
+    /// Chance to be among the candidates, about.
+    presence: f32,
 }
 
 #[derive(Clone, Debug)]
@@ -51,9 +53,10 @@ pub struct Arrival {
 }
 
 impl Emitters {
-    /// Collects what emits. `geometries` are the scene's surfaces in unit space.
+    /// Collects what emits. `geometries` are the scene's surfaces in unit space. `candidates` is how many are drawn at a
+    /// time, to pick the best of: it scales [`density`](Self::density).
     #[must_use]
-    pub fn new(scene: &Scene, geometries: &[Geometry], normalization: &Normalization) -> Self {
+    pub fn new(scene: &Scene, geometries: &[Geometry], normalization: &Normalization, candidates: u32) -> Self {
         let mut found = Vec::new();
         for (surface, geometry) in geometries.iter().enumerate() {
             let exitance = scene.materials[scene.surfaces[surface].material as usize].exitance;
@@ -86,7 +89,8 @@ impl Emitters {
             }
             let chance = power / total;
             sum += chance;
-            emitters.entries.push(Entry { source, chance });
+            let presence = (chance * candidates as f32).min(1.0);
+            emitters.entries.push(Entry { source, chance, presence });
             emitters.chances.push(sum);
         }
         emitters
@@ -98,7 +102,7 @@ impl Emitters {
     pub fn draw(&self, geometries: &[Geometry], at: Vec3, choice: f32, u: Vec2) -> Option<Arrival> {
         // Rounding may leave the last sum a little below the choice.
         let index = self.chances.partition_point(|&sum| sum <= choice).min(self.entries.len().checked_sub(1)?);
-        let Entry { source, chance } = &self.entries[index];
+        let Entry { source, chance, presence } = &self.entries[index];
         match source {
             Source::Surface { surface, radiance, area } => {
                 let (from, normal, weight) = geometries[*surface as usize].sample_area(Domain::WHOLE, u.x, u.y);
@@ -111,7 +115,7 @@ impl Emitters {
                     surface: Some(*surface),
                     direction,
                     irradiance: *radiance * (cosine * weight / (distance2 * chance)),
-                    density: chance * distance2 / (area * cosine),
+                    density: presence * distance2 / (area * cosine),
                 })
             }
             Source::Light { light, position } => {
@@ -142,8 +146,8 @@ impl Emitters {
     #[must_use]
     pub fn density(&self, surface: u32, distance: f32, cosine: f32) -> f32 {
         match self.entries.get(self.entry_of[surface as usize] as usize) {
-            Some(Entry { source: Source::Surface { area, .. }, chance }) => {
-                chance * distance * distance / (area * cosine)
+            Some(Entry { source: Source::Surface { area, .. }, presence, .. }) => {
+                presence * distance * distance / (area * cosine)
             }
             _ => 0.0,
         }
