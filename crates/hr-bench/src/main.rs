@@ -1,2 +1,7 @@
 //! The `hr-bench` command.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    hr_bench::main_with(std::env::args_os())
+}

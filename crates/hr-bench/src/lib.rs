@@ -1,0 +1,38 @@
+//! What the library is measured by: a reference path tracer, distances between images, and reports of accuracy and
+//! speed. Not published; the `hr-bench` command is its face.
+
+pub mod args;
+pub mod compare;
+pub mod error;
+pub mod float_image;
+pub mod path_tracer;
+pub mod run;
+
+pub use error::BenchError;
+pub use path_tracer::{PathTracer, Reference};
+
+use clap::Parser;
+use clap::error::ErrorKind;
+use std::ffi::OsString;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// The program: reads the command line, does what it says, and ends with status 0, or with 1 and one line on standard
+/// error.
+pub fn main_with(line: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match args::Cli::try_parse_from(line) {
+        Ok(cli) => cli,
+        Err(error) => {
+            let fine = matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
+            drop(error.print());
+            return if fine { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+        }
+    };
+    match run::run(&cli, &mut std::io::stdout().lock()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            drop(writeln!(std::io::stderr(), "hr-bench: {error}"));
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,400 @@
+//! A reference path tracer, to measure solutions by: unbiased, on the exact surfaces, and with nothing of hierarchical
+//! radiosity in it but its rays and its reflectors.
+//!
+//! At every point of a path one emitter is picked for direct light, and one part of the BRDF (its Lambertian share, its
+//! glossy part or its mirror) for the path to go on. Emitters that both find are weighted by the power heuristic
+//! (Veach & Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", SIGGRAPH 1995). Its weights
+//! for the two add up to 1 for *any* positive functions in place of the densities, so that the glossy part's density,
+//! which a [`Reflector`] does not tell, may be replaced by what it is in the ideal: glossy · cos / albedo.
+//!
+//! What counts as right where models differ: backs of one-sided surfaces absorb, only fronts emit, shading normals that
+//! do not see the eye are bent until they just do, and no light passes below the true surface.
+
+mod emitters;
+mod sampler;
+#[cfg(test)]
+mod tests;
+
+pub use emitters::{Arrival, Emitters};
+pub use sampler::Sampler;
+
+use crate::BenchError;
+use glam::{DVec3, Vec2, Vec3};
+use glossy_ext::{Place, Reflector};
+use hr_diffuse::sampling::hash;
+use hr_diffuse::visibility::NO_BLOCKER;
+use hr_diffuse::{Geometry, Hit, Normalization, Rgb, Visibility};
+use hr_scene::{Camera, Image, Scene};
+use rayon::prelude::*;
+use std::f32::consts::{FRAC_1_PI, PI};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Rays start this far from their surface (unit space): what rounding needs.
+const START: f32 = 1e-6;
+/// Cosine that shading normals are bent to where they do not see the eye.
+const GRAZING: f32 = 0.02;
+/// Paths go on this often before chance may end them.
+const SURE_BOUNCES: u32 = 3;
+/// Largest chance to go on after that: bounds the length of paths where nothing is absorbed.
+const MOST_SURVIVAL: f32 = 0.95;
+/// A glossy part is drawn with at least this albedo: that of a remainder may be 0 in the mean only.
+const LEAST_ALBEDO: f32 = 0.05;
+/// Emitters among which one is picked at each point of a path.
+const CANDIDATES: u32 = 4;
+/// Step from one candidate's place on its emitter to the next one's: the two-dimensional golden ratio, as in
+/// [`hr_diffuse::sampling`].
+const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
+/// Side of the grid of rays that look for emitters in a pixel.
+const LOOKS: u32 = 4;
+
+/// Pairs of random numbers that one bounce uses, after the pixel's own.
+const PAIRS: u32 = 4;
+
+/// Path traces a scene.
+#[derive(Debug)]
+pub struct PathTracer {
+    scene: Arc<Scene>,
+    visibility: Visibility,
+    normalization: Normalization,
+    emitters: Emitters,
+    /// Largest channel of each material's glossy albedo, 0 where it is diffuse.
+    albedos: Vec<f32>,
+}
+
+/// An image and how sure it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference {
+    /// Linear radiance, W/(m² sr).
+    pub image: Image,
+    /// Standard error of each pixel and channel, from the variance among its paths. They are stratified, so that the
+    /// true error is this or less.
+    pub sigma: Image,
+}
+
+/// A point that reflects.
+struct Point {
+    position: Vec3,
+    surface: u32,
+    /// True unit normal on the side that was hit.
+    true_normal: Vec3,
+    /// Shading frame on that side.
+    place: Place,
+    /// Back along the path, in the frame.
+    outgoing: Vec3,
+    reflector: Arc<dyn Reflector>,
+    diffuse: Rgb,
+    /// Chances of the Lambertian share, the glossy part and the mirror to be followed.
+    chances: [f32; 3],
+    /// Glossy albedo.
+    albedo: f32,
+}
+
+/// Where a path goes on.
+struct Step {
+    direction: Vec3,
+    weight: Rgb,
+    /// What stands for the density that direction was drawn with; infinite for a mirror.
+    density: f32,
+}
+
+impl PathTracer {
+    /// Prepares a scene.
+    ///
+    /// # Errors
+    /// [`BenchError::Surface`] where a surface makes no sense.
+    pub fn new(scene: Arc<Scene>) -> Result<Self, BenchError> {
+        let normalization = Normalization::new(&scene.surfaces);
+        let geometries = scene
+            .surfaces
+            .iter()
+            .enumerate()
+            .map(|(surface, s)| {
+                Geometry::from_surface(s, &normalization).map_err(|source| BenchError::Surface { surface, source })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let emitters = Emitters::new(&scene, &geometries, &normalization, CANDIDATES);
+        let albedo = |reflector: &Arc<dyn Reflector>| {
+            if reflector.is_diffuse() { 0.0 } else { reflector.glossy_albedo().max_element().max(LEAST_ALBEDO) }
+        };
+        let albedos = scene.materials.iter().map(|m| albedo(&m.reflector)).collect();
+        let visibility = Visibility::new(&geometries);
+        Ok(Self { scene, visibility, normalization, emitters, albedos })
+    }
+
+    /// The scene.
+    #[must_use]
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// The rays.
+    #[must_use]
+    pub fn visibility(&self) -> &Visibility {
+        &self.visibility
+    }
+
+    /// A position in unit space, where [`visibility`](Self::visibility) is.
+    #[must_use]
+    pub fn to_unit(&self, position: DVec3) -> Vec3 {
+        self.normalization.to_unit(position)
+    }
+
+    /// The image that a camera takes with `paths` paths per pixel (at least one). The same seed gives the same image,
+    /// for any number of threads; others give independent ones. `watch` is told the share that is done.
+    #[must_use]
+    pub fn render(&self, camera: &Camera, paths: u32, seed: u32, watch: &(dyn Fn(f32) + Sync)) -> Reference {
+        let paths = paths.max(1);
+        let mut image = Image::new(camera.width, camera.height);
+        let mut sigma = image.clone();
+        let width = camera.width as usize;
+        let eye = self.to_unit(camera.eye.into());
+        let view = View::new(camera);
+        let done = AtomicU32::new(0);
+        let rows = image.pixels.par_chunks_mut(width).zip(sigma.pixels.par_chunks_mut(width));
+        rows.enumerate().for_each(|(y, (row, sigmas))| {
+            for (x, (pixel, sigma)) in row.iter_mut().zip(sigmas).enumerate() {
+                let seed = hash(hash(x as u32, y as u32), seed);
+                let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+                for index in 0..paths {
+                    let sampler = Sampler::new(seed, index);
+                    let direction = view.direction(Vec2::new(x as f32, y as f32), sampler.pair(0));
+                    let radiance = self.path(eye, direction, &sampler).as_dvec3();
+                    sum += radiance;
+                    squares += radiance * radiance;
+                }
+                let n = f64::from(paths);
+                let mean = sum / n;
+                let variance = (squares / n - mean * mean).max(DVec3::ZERO) / (n - 1.0).max(1.0);
+                (*pixel, *sigma) = (mean.as_vec3(), variance.map(f64::sqrt).as_vec3());
+            }
+            let rows = done.fetch_add(1, Ordering::Relaxed) + 1;
+            watch(rows as f32 / camera.height as f32);
+        });
+        Reference { image, sigma }
+    }
+
+    /// What a camera sees of the emitters themselves: their own radiance, without any reflection.
+    #[must_use]
+    pub fn emission(&self, camera: &Camera) -> Image {
+        let mut image = Image::new(camera.width, camera.height);
+        let eye = self.to_unit(camera.eye.into());
+        let view = View::new(camera);
+        image.pixels.par_chunks_mut(camera.width as usize).enumerate().for_each(|(y, row)| {
+            for (x, pixel) in row.iter_mut().enumerate() {
+                for i in 0..LOOKS * LOOKS {
+                    let within = Vec2::new((i % LOOKS) as f32 + 0.5, (i / LOOKS) as f32 + 0.5) / LOOKS as f32;
+                    let direction = view.direction(Vec2::new(x as f32, y as f32), within);
+                    if let Some(hit) = self.visibility.closest(eye, direction, START, f32::MAX) {
+                        *pixel += self.emitted(&hit) / (LOOKS * LOOKS) as f32;
+                    }
+                }
+            }
+        });
+        image
+    }
+
+    /// Radiance that arrives at `origin` (unit space) against the unit `direction`, by one path.
+    #[must_use]
+    pub fn path(&self, mut origin: Vec3, mut direction: Vec3, sampler: &Sampler) -> Rgb {
+        let (mut light, mut throughput) = (Rgb::ZERO, Rgb::ONE);
+        let (mut own, mut density) = (NO_BLOCKER, f32::INFINITY);
+        for bounce in 0.. {
+            let Some(hit) = self.visibility.closest_except(origin, direction, START, f32::MAX, own) else { break };
+            let emitted = self.emitted(&hit);
+            if emitted != Rgb::ZERO {
+                let other = self.emitters.density(hit.surface, hit.t, -hit.normal.dot(direction));
+                light += throughput * emitted * power_heuristic(density, other);
+            }
+            let Some(point) = self.point(&hit, direction) else { break };
+            let pair = |i: u32| sampler.pair(1 + bounce * PAIRS + i);
+            let (choices, place, turn, chance) = (pair(0), pair(1), pair(2), pair(3));
+            light += throughput * self.direct(&point, choices.x, place, chance.x);
+            let Some(step) = point.step(choices.y, turn) else { break };
+            throughput *= step.weight;
+            if bounce + 1 >= SURE_BOUNCES {
+                // A remainder beside the Lambertian share may be negative, and so may be its paths.
+                let survival = throughput.abs().max_element().min(MOST_SURVIVAL);
+                if chance.y >= survival {
+                    break;
+                }
+                throughput /= survival;
+            }
+            (origin, direction, own, density) = (point.position, step.direction, point.surface, step.density);
+        }
+        light
+    }
+
+    /// Radiance that a surface emits where it was hit.
+    fn emitted(&self, hit: &Hit) -> Rgb {
+        let exitance = self.scene.materials[self.scene.surfaces[hit.surface as usize].material as usize].exitance;
+        if hit.front { exitance * FRAC_1_PI } else { Rgb::ZERO }
+    }
+
+    /// What a hit makes of light; none where it absorbs everything.
+    fn point(&self, hit: &Hit, direction: Vec3) -> Option<Point> {
+        let index = self.scene.surfaces[hit.surface as usize].material as usize;
+        let material = &self.scene.materials[index];
+        if !hit.front && !material.two_sided {
+            return None;
+        }
+        let colored = self.scene.base_color(hit.surface, hit.uv.x, hit.uv.y);
+        let colored = colored.and_then(|color| material.reflector.with_base_color(color));
+        let reflector = colored.unwrap_or_else(|| Arc::clone(&material.reflector));
+        let diffuse = reflector.diffuse();
+        let albedo = self.albedos[index];
+        let chances = [diffuse.max_element(), albedo, reflector.mirror().max_element()];
+        let total: f32 = chances.iter().sum();
+        if total <= 0.0 {
+            return None;
+        }
+        let side = if hit.front { 1.0 } else { -1.0 };
+        let away = -direction;
+        let shading = self.shading_normal(hit) * side;
+        let facing = shading.dot(away);
+        let normal = if facing >= GRAZING { shading } else { (shading + away * (GRAZING - facing)).normalize_or(away) };
+        let true_normal = hit.normal * side;
+        // Without shading normals the true one is right also at grazing directions.
+        let flat = self.scene.surfaces[hit.surface as usize].shading_normals.is_none();
+        let place = Place::new(hit.point, if flat { true_normal } else { normal });
+        Some(Point {
+            position: hit.point,
+            surface: hit.surface,
+            true_normal,
+            outgoing: place.local(away),
+            place,
+            reflector,
+            diffuse,
+            chances: chances.map(|chance| chance / total),
+            albedo,
+        })
+    }
+
+    /// Unit shading normal on the front.
+    fn shading_normal(&self, hit: &Hit) -> Vec3 {
+        let Some(normals) = &self.scene.surfaces[hit.surface as usize].shading_normals else { return hit.normal };
+        let weights = self.visibility.geometries()[hit.surface as usize].corner_weights(hit.uv);
+        let normal: Vec3 = normals.iter().zip(weights).map(|(n, w)| *n * w).sum();
+        normal.try_normalize().unwrap_or(hit.normal)
+    }
+
+    /// Radiance that a point reflects of the light of one emitter. It is picked from a few candidates by what they
+    /// would send were nothing between, so that near lamps win over strong ones (Talbot, Cline, Egbert, "Importance
+    /// Resampling for Global Illumination", EGSR 2005); the candidates are stratified by power.
+    fn direct(&self, point: &Point, choice: f32, place: Vec2, pick: f32) -> Rgb {
+        let geometries = self.visibility.geometries();
+        let (mut best, mut total) = (None, 0.0);
+        let mut pick = pick;
+        for i in 0..CANDIDATES {
+            let (choice, place) = ((choice + i as f32) / CANDIDATES as f32, (place + STEP * i as f32).fract());
+            let Some(arrival) = self.emitters.draw(geometries, point.position, choice, place) else { continue };
+            let light = point.reflected(&arrival) * arrival.irradiance;
+            let strength = light.abs().element_sum();
+            if strength > 0.0 {
+                // One of several in one pass: the new one replaces the old one by its share of the sum so far, and what
+                // is left of the random number serves the next.
+                total += strength;
+                let share = strength / total;
+                if pick < share {
+                    best = Some((arrival, light / strength));
+                    pick /= share;
+                } else {
+                    pick = (pick - share) / (1.0 - share);
+                }
+            }
+        }
+        let Some((arrival, light)) = best else { return Rgb::ZERO };
+        let ends = [point.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
+        let blocked = self.visibility.occluded(point.position, arrival.from, ends, &mut { NO_BLOCKER });
+        if blocked { Rgb::ZERO } else { light * (total / CANDIDATES as f32) }
+    }
+}
+
+impl Point {
+    /// BRDF · cosine for light that was drawn from an emitter, each part of the BRDF weighted against the chance that
+    /// a path that follows it finds the same light.
+    fn reflected(&self, arrival: &Arrival) -> Rgb {
+        let incident = self.place.local(arrival.direction);
+        if incident.z <= 0.0 || arrival.direction.dot(self.true_normal) <= 0.0 {
+            return Rgb::ZERO;
+        }
+        let weight = |density: f32| power_heuristic(arrival.density, density);
+        let mut brdf = self.diffuse * (FRAC_1_PI * weight(self.diffuse_density(incident)));
+        if self.chances[1] > 0.0 {
+            let glossy = self.reflector.glossy(incident, self.outgoing);
+            brdf += glossy * weight(self.glossy_density(glossy, incident));
+        }
+        brdf * incident.z
+    }
+
+    /// Follows one part of the BRDF; none where it leads nowhere.
+    fn step(&self, choice: f32, u: Vec2) -> Option<Step> {
+        let [diffuse, glossy, mirror] = self.chances;
+        let (incident, weight, density) = if choice < diffuse {
+            let incident = cosine_hemisphere(u);
+            (incident, self.diffuse / diffuse, self.diffuse_density(incident))
+        } else if choice < diffuse + glossy {
+            let sample = self.reflector.sample(self.outgoing, u)?;
+            let value = self.reflector.glossy(sample.incident, self.outgoing);
+            (sample.incident, sample.weight / glossy, self.glossy_density(value, sample.incident))
+        } else {
+            let incident = Vec3::new(-self.outgoing.x, -self.outgoing.y, self.outgoing.z);
+            (incident, self.reflector.mirror() / mirror, f32::INFINITY)
+        };
+        let direction = (self.place.frame * incident).try_normalize()?;
+        let goes_on = weight.is_finite() && weight != Rgb::ZERO && direction.dot(self.true_normal) > 0.0;
+        goes_on.then_some(Step { direction, weight, density })
+    }
+
+    fn diffuse_density(&self, incident: Vec3) -> f32 {
+        self.chances[0] * incident.z * FRAC_1_PI
+    }
+
+    /// Of a direction for which the glossy part of the BRDF is `glossy`.
+    fn glossy_density(&self, glossy: Rgb, incident: Vec3) -> f32 {
+        self.chances[1] * glossy.abs().max_element() * incident.z / self.albedo
+    }
+}
+
+/// Weight of a sample of density `own` where `other` is that of another way to draw it (exponent 2). The weights of
+/// both add up to 1; an infinite density takes all.
+fn power_heuristic(own: f32, other: f32) -> f32 {
+    if own.is_infinite() {
+        return 1.0;
+    }
+    let ratio = other / own;
+    if ratio.is_nan() { 0.0 } else { (1.0 + ratio * ratio).recip() }
+}
+
+/// A direction of density cos/π (Malley's method).
+fn cosine_hemisphere(u: Vec2) -> Vec3 {
+    let (sin, cos) = (2.0 * PI * u.x).sin_cos();
+    let radius = u.y.sqrt();
+    Vec3::new(radius * cos, radius * sin, (1.0 - u.y).sqrt())
+}
+
+/// A camera, ready to give many directions.
+struct View {
+    corner: DVec3,
+    right: DVec3,
+    down: DVec3,
+}
+
+impl View {
+    fn new(camera: &Camera) -> Self {
+        let (right, up, forward) = camera.frame();
+        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+        let pixel = 2.0 * (0.5 * camera.fov_x.to_radians()).tan() / width;
+        Self {
+            corner: forward + (up * height - right * width) * (0.5 * pixel),
+            right: right * pixel,
+            down: -up * pixel,
+        }
+    }
+
+    /// Unit direction through a place within a pixel.
+    fn direction(&self, pixel: Vec2, within: Vec2) -> Vec3 {
+        let at = pixel.as_dvec2() + within.as_dvec2();
+        (self.corner + self.right * at.x + self.down * at.y).normalize().as_vec3()
+    }
+}

@@ -1,0 +1,83 @@
+//! Well-spread random numbers of one path: Sobol' points in pairs, padded to any number of dimensions.
+
+use glam::Vec2;
+use hr_diffuse::sampling::{hash, unit};
+
+/// The numbers of one of the paths of a pixel. Every pair of dimensions is the two-dimensional Sobol' sequence, its
+/// order shuffled and its values scrambled by the pair's own hash (Burley, "Practical Hash-based Owen Scrambling", JCGT
+/// 9(4), 2020): stratified within each pair, independent among pairs, unbiased for any number of paths.
+#[derive(Clone, Copy, Debug)]
+pub struct Sampler {
+    seed: u32,
+    index: u32,
+}
+
+impl Sampler {
+    /// For path number `index` of the pixel that `seed` stands for.
+    #[must_use]
+    pub fn new(seed: u32, index: u32) -> Self {
+        Self { seed, index }
+    }
+
+    /// Two numbers in 0…1 (1 excluded).
+    #[must_use]
+    pub fn pair(&self, dimension: u32) -> Vec2 {
+        let seed = hash(self.seed, dimension);
+        let index = scrambled(self.index, hash(seed, 1));
+        Vec2::new(unit(scrambled(index.reverse_bits(), hash(seed, 2))), unit(scrambled(sobol(index), hash(seed, 3))))
+    }
+}
+
+/// Second dimension of the Sobol' sequence: its direction numbers are the rows of Pascal's triangle modulo 2.
+fn sobol(mut index: u32) -> u32 {
+    let (mut result, mut direction) = (0, 1 << 31);
+    while index != 0 {
+        if index & 1 == 1 {
+            result ^= direction;
+        }
+        index >>= 1;
+        direction ^= direction >> 1;
+    }
+    result
+}
+
+/// Owen scrambling: every bit is flipped by a hash of the bits above it. On reversed bits that is a permutation in
+/// which carries run upward only (Laine & Karras, "Stratified sampling for stochastic transparency", CGF 30(4), 2011).
+fn scrambled(value: u32, seed: u32) -> u32 {
+    let mut x = value.reverse_bits().wrapping_add(seed);
+    for factor in [0x6c50_b47c, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6] {
+        x ^= x.wrapping_mul(factor);
+    }
+    x.reverse_bits()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pair_is_stratified() {
+        for (seed, dimension) in [(1, 0), (7, 5), (0xdead_beef, 31)] {
+            // 64 points of a (0, 2)-sequence: one in each box of area 1/64, whatever the box's shape.
+            for columns in [1, 2, 4, 8, 16, 32, 64] {
+                let mut boxes = vec![0; 64];
+                for index in 0..64 {
+                    let p = Sampler::new(seed, index).pair(dimension);
+                    let (x, y) = ((p.x * columns as f32) as usize, (p.y * (64 / columns) as f32) as usize);
+                    boxes[y * columns + x] += 1;
+                }
+                assert_eq!(boxes, [1; 64], "seed {seed}, dimension {dimension}: {columns} columns");
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_are_independent() {
+        // Correlation of x among two pairs: 0 ± 1/√n, here 4 sigma.
+        let n = 4096;
+        let product: f32 =
+            (0..n).map(|i| (Sampler::new(3, i).pair(1).x - 0.5) * (Sampler::new(3, i).pair(2).x - 0.5)).sum();
+        let correlation = product * 12.0 / n as f32;
+        assert!(correlation.abs() < 4.0 / (n as f32).sqrt(), "correlation {correlation}");
+    }
+}

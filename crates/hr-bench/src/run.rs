@@ -1,0 +1,83 @@
+//! What the subcommands do.
+
+use crate::args::{Cli, Command, CompareArgs, ReferenceArgs};
+use crate::compare::{compare, luminance};
+use crate::{BenchError, PathTracer, float_image};
+use hr_scene::{Camera, ImageKind, Scene, ToneMap};
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Where results are printed to.
+pub type Out<'a> = &'a mut dyn Write;
+
+/// Does what the command line says.
+///
+/// # Errors
+/// Anything that keeps it from being done; the text is one line for the user.
+pub fn run(cli: &Cli, out: Out<'_>) -> Result<(), BenchError> {
+    match &cli.command {
+        Command::Reference(args) => reference(args, out),
+        Command::Compare(args) => compare_files(args, out),
+    }
+}
+
+/// Prints one line.
+pub(crate) fn say(out: Out<'_>, line: &str) -> Result<(), BenchError> {
+    writeln!(out, "{line}").and_then(|()| out.flush()).map_err(BenchError::Output)
+}
+
+/// The scene's camera of that name, or that in a file; the first one, or one made for the scene, without a name.
+pub(crate) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera, BenchError> {
+    let Some(name) = name else { return Ok(scene.default_camera()) };
+    if let Some((_, camera)) = scene.cameras.iter().find(|(known, _)| known == name) {
+        return Ok(*camera);
+    }
+    if Path::new(name).extension().is_some() {
+        return Ok(Camera::load(Path::new(name))?);
+    }
+    let known: Vec<&str> = scene.cameras.iter().map(|(known, _)| known.as_str()).collect();
+    let text = format!("'{name}' is no camera of {}; it has {}, or give a .json file", scene.name, known.join(", "));
+    Err(BenchError::Arguments(text))
+}
+
+fn reference(args: &ReferenceArgs, out: Out<'_>) -> Result<(), BenchError> {
+    for path in std::iter::once(&args.image).chain(&args.sigma) {
+        ImageKind::of(path)?;
+    }
+    let scene = Arc::new(Scene::load(&args.scene)?);
+    let mut camera = camera(&scene, args.camera.as_deref())?;
+    if let Some(width) = args.width {
+        let height = f64::from(camera.height) * f64::from(width) / f64::from(camera.width);
+        camera = Camera { width, height: (height.round() as u32).clamp(1, 16384), ..camera };
+    }
+    let tracer = PathTracer::new(scene)?;
+    let start = Instant::now();
+    let found = tracer.render(&camera, args.spp, args.seed, &|_| ());
+    let seconds = start.elapsed().as_secs_f64();
+    let primaries = tracer.scene().primaries;
+    found.image.save(&args.image, &ToneMap::default(), primaries)?;
+    if let Some(path) = &args.sigma {
+        found.sigma.save(path, &ToneMap::default(), primaries)?;
+    }
+    let sum = |image: &hr_scene::Image| image.pixels.iter().map(|p| p.as_dvec3().element_sum()).sum::<f64>();
+    let noise = 100.0 * sum(&found.sigma) / sum(&found.image).max(f64::MIN_POSITIVE);
+    let Camera { width, height, .. } = camera;
+    say(out, &format!("{width} x {height} pixels, {} paths each, {seconds:.1} s, noise {noise:.2} %", args.spp))
+}
+
+fn compare_files(args: &CompareArgs, out: Out<'_>) -> Result<(), BenchError> {
+    let (image, reference) = (float_image::read(&args.image)?, float_image::read(&args.reference)?);
+    let sigma = args.sigma.as_deref().map(float_image::read).transpose()?;
+    let below = args.below.unwrap_or(f64::INFINITY);
+    let found = compare(&image, &reference, sigma.as_ref(), |_, p| luminance(p) < below)?;
+    say(out, &found.to_string())?;
+    match args.max_block {
+        Some(most) if found.block_l1 > most => {
+            let (block, most) = (100.0 * found.block_l1, 100.0 * most);
+            Err(BenchError::Compare(format!("block L1 is {block:.2} %, more than {most:.2} %")))
+        }
+        _ => Ok(()),
+    }
+}
