@@ -64,9 +64,8 @@ impl Output {
 /// Whether the folder that a file is to be written to is there.
 fn has_folder(path: &Path) -> Result<(), SceneError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let is_folder = std::fs::metadata(folder).map_or_else(Err, |found| {
-        if found.is_dir() { Ok(()) } else { Err(std::io::ErrorKind::NotADirectory.into()) }
-    });
+    let is_folder = std::fs::metadata(folder)
+        .map_or_else(Err, |found| if found.is_dir() { Ok(()) } else { Err(std::io::ErrorKind::NotADirectory.into()) });
     is_folder.map_err(|source| SceneError::Io { path: path.to_path_buf(), source })
 }
 
@@ -106,7 +105,10 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
     }
     let scene = load(args, &progress)?;
     let loaded = progress.elapsed();
-    let (solved, error) = solve(scene, args, &progress)?;
+    // The window shows mirrors by their distributions in any mode.
+    let mirrors = scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
+    let distributions = mode == Mode::Distributions || mirrors && matches!(output, Output::Window);
+    let (solved, error) = solve(scene, args, distributions, &progress)?;
     let begin = progress.elapsed();
     let show = Show { args, mode, solved, error, progress: &progress, loaded, begin };
     match output {
@@ -139,7 +141,7 @@ fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
 
 /// Solves for the light to the accuracy asked for, or until the time is up or the user has seen enough. Also tells
 /// the relative error that the solution is believed to have.
-fn solve(scene: Arc<Scene>, args: &Args, progress: &Progress) -> Result<(Solved, f32), ViewError> {
+fn solve(scene: Arc<Scene>, args: &Args, distributions: bool, progress: &Progress) -> Result<(Solved, f32), ViewError> {
     let budget = args.time_budget.map(Duration::from_secs_f64);
     let interrupt = Interrupt::listen();
     let (mut error, mut stopped) = (1.0, false);
@@ -159,8 +161,6 @@ fn solve(scene: Arc<Scene>, args: &Args, progress: &Progress) -> Result<(Solved,
         let latest = *latest.get_or_insert(now.mul_f64(1.0 + PATIENCE) + Duration::from_secs(1));
         if stopped && now >= latest { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    // Samples are reflected where they are looked at: no distribution is needed then.
-    let distributions = args.mode == crate::Mode::Distributions;
     let solved = Solved::new(scene, Settings { error: args.error }, distributions, watch)?;
     Ok((solved, error))
 }

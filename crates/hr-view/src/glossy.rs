@@ -15,7 +15,7 @@ pub fn leaving(solution: &Solution<GlossyField>, leaf: NodeId, away: Vec3) -> Rg
     let element = &solution.elements.nodes[leaf.index()];
     let distribution = &solution.reflected[leaf.index()];
     if distribution.is_empty() {
-        // Faint: carried as diffuse light.
+        // Carried as diffuse light.
         let albedo = solution.field.active(element.material).unwrap_or(Rgb::ZERO);
         return solution.exitant.irradiance[leaf.index()] * albedo * FRAC_1_PI;
     }
