@@ -16,8 +16,6 @@ const NARROWEST: f32 = 0.03;
 const WIDE: f32 = 4.0;
 /// Slope of the lobe that stands for a perfect mirror in light transport.
 const MIRROR_ALPHA: f32 = 0.03;
-/// Finest level of the distributions of inner nodes.
-const PULLED_LEVEL: u8 = 4;
 /// A leaf's glossy part reflects at most this times its mean albedo: directions differ, and projections err.
 const MOST_GAIN: f32 = 1.15;
 /// Samples are scaled up by at most this to add up to a leaf's irradiance.
@@ -62,8 +60,6 @@ pub struct GlossyField {
     /// `None`: the material is diffuse.
     materials: Vec<Option<Material>>,
     refinement: Refinement,
-    /// For averages: what is linked at inner nodes needs no fine detail.
-    pulled: Refinement,
     counters: Counters,
 }
 
@@ -83,8 +79,8 @@ impl GlossyField {
                 }
             })
         });
-        let pulled = Refinement { max_level: refinement.max_level.min(PULLED_LEVEL), ..refinement };
-        Self { materials: materials.collect(), refinement, pulled, counters: Counters::default() }
+        
+        Self { materials: materials.collect(), refinement, counters: Counters::default() }
     }
 
     /// Work done so far.
@@ -232,7 +228,7 @@ impl LightField for GlossyField {
             })
             .collect();
         let weighted: Vec<(f32, &Haar)> = oriented.iter().map(|(share, haar)| (*share, haar.as_ref())).collect();
-        Haar::average(&weighted, &self.pulled, Rgb::ZERO)
+        Haar::average(&weighted, &self.refinement, Rgb::ZERO)
     }
 
     fn radiance(&self, exitant: &Haar, away: Vec3) -> Rgb {

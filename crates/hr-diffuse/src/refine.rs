@@ -32,8 +32,6 @@ const DIRECTIONAL_SHARE: f32 = 0.05;
 const FIRST_SEGMENTS: u32 = 4;
 const MOST_SEGMENTS: u32 = 32;
 
-static DS: std::sync::LazyLock<f32> = std::sync::LazyLock::new(|| std::env::var("DS").map_or(DIRECTIONAL_SHARE, |v| v.parse().unwrap()));
-static EX: std::sync::LazyLock<f32> = std::sync::LazyLock::new(|| std::env::var("EX").map_or(0.5, |v| v.parse().unwrap()));
 /// A link to be, between two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Pair {
@@ -220,7 +218,7 @@ struct Interval {
 
 impl Interval {
     fn error(&self) -> f32 {
-        GEOMETRY_SHARE * self.geometry + RADIOSITY_SHARE * self.radiosity + *DS * self.directional
+        GEOMETRY_SHARE * self.geometry + RADIOSITY_SHARE * self.radiosity + DIRECTIONAL_SHARE * self.directional
     }
 }
 
@@ -266,7 +264,7 @@ fn decide<L: LightField>(
         return split_self(light, pair.receiver, tolerance, stopped);
     }
     let Some(bounds) = factor_bounds(light.scene, r, s) else { return Verdict::Facing };
-    let weight = r.importance * (r.area / tolerance.area).powf(*EX);
+    let weight = r.importance * (r.area / tolerance.area).sqrt();
     let interval = interval(light, pair.sender, &bounds, tolerance.error / weight);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
@@ -330,7 +328,7 @@ fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Toleranc
         return Verdict::SplitBoth;
     }
     // The inside of a curved surface: split while the light that would be lost matters.
-    let weight = element.importance * (element.area / tolerance.area).powf(*EX);
+    let weight = element.importance * (element.area / tolerance.area).sqrt();
     let at_stake = light.emitted_most(node) * weight;
     let splittable = element.is_patch() && element.radius > tolerance.smallest;
     if at_stake > tolerance.error && splittable && !stopped { Verdict::SplitBoth } else { Verdict::Facing }

@@ -18,7 +18,7 @@ use std::time::Instant;
 
 /// A link's tolerance is this share of the error asked for, times the mean irradiance. Chosen so that the error of
 /// the built-in scenes stays below what was asked for.
-const LINK_SHARE: f32 = 0.05;
+const LINK_SHARE: f32 = 0.03;
 /// Elements are not split below this share of the error's square root: features smaller than that are not resolved.
 const SMALLEST_SHARE: f32 = 0.008;
 /// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
@@ -27,9 +27,11 @@ const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
 /// diffuse light until it is shown.
 const FAINT_SHARE: f32 = 0.5;
 /// A leaf's light is reflected anew once its irradiance has changed by this share of the error asked for.
-const REFLECT_SHARE: f32 = 0.5;
+const REFLECT_SHARE: f32 = 1.0;
 /// Iterations end when all that are to come would change the solution by less than this share of the error.
 const CONVERGED_SHARE: f32 = 0.02;
+/// The first pass that reflects the extension's light: before it, there is little light to reflect.
+const FIRST_REFLECTED: usize = 2;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
 
@@ -178,7 +180,7 @@ impl<L: LightField> Solver<L> {
                 if iteration == 1 && pass + 2 >= PASSES.len() {
                     self.place();
                 }
-                let residual = self.iterate();
+                let residual = self.iterate(pass >= FIRST_REFLECTED);
                 let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
                 stopped |= watch(&self.progress(Phase::Transport, fraction, *looseness)).is_break();
                 if self.remaining(residual) < goal {
@@ -204,7 +206,7 @@ impl<L: LightField> Solver<L> {
     ) -> bool {
         let start = Instant::now();
         let tolerance = Tolerance {
-            error: std::env::var("LS").map_or(LINK_SHARE, |v| v.parse().unwrap()) * self.settings.error * looseness * self.mean_irradiance(),
+            error: LINK_SHARE * self.settings.error * looseness * self.mean_irradiance(),
             area: self.area,
             smallest: SMALLEST_SHARE * self.settings.error.sqrt(),
         };
@@ -244,14 +246,16 @@ impl<L: LightField> Solver<L> {
 
     /// One iteration of the paper: gather, push, reflect, pull. Returns the change of the mean radiosity, relative
     /// to it.
-    fn iterate(&mut self) -> f32 {
+    fn iterate(&mut self, reflects: bool) -> f32 {
         let before: Vec<Rgb> = self.exitant.irradiance.clone();
         let start = Instant::now();
         self.gather();
         self.push();
         let middle = Instant::now();
-        let changed = self.reflect(false);
-        self.pull_reflected(&changed);
+        if reflects {
+            let changed = self.reflect(false);
+            self.pull_reflected(&changed);
+        }
         let end = Instant::now();
         self.pull();
         self.stats.seconds.transport += (middle - start).as_secs_f64() + end.elapsed().as_secs_f64();
@@ -433,7 +437,7 @@ impl<L: LightField> Solver<L> {
 
     /// The extension turns the incident light of its leaves into exitant light.
     /// Tells which leaves changed.
-    fn reflect(&mut self, faint_too: bool) -> Vec<u32> {
+    fn reflect(&mut self, shown: bool) -> Vec<u32> {
         let elements = &self.elements;
         if !elements.nodes[0].active {
             return Vec::new();
@@ -442,7 +446,7 @@ impl<L: LightField> Solver<L> {
         self.last_reflected.resize(elements.nodes.len(), Rgb::splat(f32::NEG_INFINITY));
         let strong = |leaf: &u32| {
             let element = &elements.nodes[*leaf as usize];
-            element.active && (faint_too || self.faint[element.material as usize] == Rgb::ZERO)
+            element.active && (shown || self.faint[element.material as usize] == Rgb::ZERO)
         };
         let leaves: Vec<u32> = elements.patch_leaves().filter(strong).collect();
         let all = leaves.len() as u64;

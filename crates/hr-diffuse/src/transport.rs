@@ -12,6 +12,10 @@ use std::f32::consts::PI;
 /// at a point; else its children are.
 const CLUSTER_FAR: f32 = 0.25;
 
+/// Where the radius of a part of a surface is less than this share of its distance, the point kernel replaces the
+/// closed form: its relative error is about the square, under 0.5%.
+const FAR: f32 = 0.07;
+
 /// Exitant diffuse light per node.
 #[derive(Clone, Debug, Default)]
 pub struct Exitant {
@@ -168,6 +172,14 @@ impl<L: LightField> Light<'_, L> {
                 cosine.max(0.0) * element.area / (PI * d2 + element.area)
             }
             Kind::Front | Kind::Back => {
+                let to = element.center - x;
+                let d2 = to.length_squared();
+                if element.radius * element.radius < FAR * FAR * d2 && !element.whole_sphere {
+                    // Far enough to be a point with the mean of its normals.
+                    let direction = to / d2.sqrt();
+                    let cosines = direction.dot(n).max(0.0) * element.mean_cosine(-direction);
+                    return cosines * element.area / (PI * d2);
+                }
                 let geometry = &self.scene.surfaces()[element.source as usize];
                 form_factor::point_to_surface(geometry, &element.domain, element.kind == Kind::Back, x, n)
             }

@@ -159,7 +159,9 @@ fn solve(scene: Arc<Scene>, args: &Args, progress: &Progress) -> Result<(Solved,
         let latest = *latest.get_or_insert(now.mul_f64(1.0 + PATIENCE) + Duration::from_secs(1));
         if stopped && now >= latest { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let solved = Solved::new(scene, Settings { error: args.error }, watch)?;
+    // Samples are reflected where they are looked at: no distribution is needed then.
+    let distributions = args.mode == crate::Mode::Distributions;
+    let solved = Solved::new(scene, Settings { error: args.error }, distributions, watch)?;
     Ok((solved, error))
 }
 

@@ -3,7 +3,8 @@
 
 use glam::Vec3;
 use glossy_ext::{GlossyField, Incident, Place, Reflector, arriving};
-use hr_diffuse::{NodeId, Rgb, Solution};
+use hr_diffuse::{LightField, NodeId, Rgb, Solution};
+use std::f32::consts::FRAC_1_PI;
 
 /// Cosine below which a curved leaf's intensity per area is no longer divided by it: both vanish toward the horizon.
 const LEAST_COSINE: f32 = 0.05;
@@ -12,7 +13,13 @@ const LEAST_COSINE: f32 = 0.05;
 #[must_use]
 pub fn leaving(solution: &Solution<GlossyField>, leaf: NodeId, away: Vec3) -> Rgb {
     let element = &solution.elements.nodes[leaf.index()];
-    let light = solution.reflected[leaf.index()].eval(away);
+    let distribution = &solution.reflected[leaf.index()];
+    if distribution.is_empty() {
+        // Faint: carried as diffuse light.
+        let albedo = solution.field.active(element.material).unwrap_or(Rgb::ZERO);
+        return solution.exitant.irradiance[leaf.index()] * albedo * FRAC_1_PI;
+    }
+    let light = distribution.eval(away);
     if element.is_flat() {
         light
     } else {

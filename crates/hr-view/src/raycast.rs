@@ -4,10 +4,11 @@
 //! vertices, and the glossy part from one of two sources ([`Mode`]).
 
 use glam::{DVec3, Vec2, Vec3};
-use glossy_ext::{GlossyField, Incident, Place, Reflector, arriving};
+use crate::glossy;
+use glossy_ext::{GlossyField, Incident, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2, unit};
-use hr_diffuse::{Hierarchy, Hit, LightField, NodeId, Rgb, Solution};
+use hr_diffuse::{Hit, NodeId, Rgb, Solution};
 use hr_scene::{Camera, Image, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
@@ -129,46 +130,17 @@ impl<'a> RayCaster<'a> {
         let normal = if facing > 0.02 { shading } else { (shading + away * (0.02 - facing)).normalize() };
         let met = Met { hit, leaf, normal, away, reflector };
         let glossy = match self.mode {
-            Mode::Distributions => self.interpolated(&met),
+            Mode::Distributions => {
+                let corners = self.solution.vertices.interpolation(leaf.0, met.hit.uv);
+                glossy::interpolated(self.solution, &corners, away)
+            }
             Mode::Samples if bounce == 0 => self.reflected(&met, bounce, seed, scratch),
             Mode::Samples if met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES => {
                 self.reflected(&met, bounce, seed, scratch)
             }
-            Mode::Samples => self.leaving(leaf, away),
+            Mode::Samples => glossy::leaving(self.solution, leaf, away),
         };
         emitted + (diffuse + glossy).max(Rgb::ZERO)
-    }
-
-    /// Glossy radiance from a leaf's distribution.
-    fn leaving(&self, leaf: NodeId, away: Vec3) -> Rgb {
-        let element = &self.solution.elements.nodes[leaf.index()];
-        let distribution = &self.solution.reflected[leaf.index()];
-        if distribution.is_empty() {
-            // Carried as diffuse light.
-            let albedo = self.solution.field.active(element.material).unwrap_or(Rgb::ZERO);
-            return self.solution.exitant.irradiance[leaf.index()] * albedo * FRAC_1_PI;
-        }
-        let light = distribution.eval(away);
-        if element.is_flat() {
-            light
-        } else {
-            // Intensity per area over the cosine; both vanish toward the horizon.
-            light / element.mean_cosine(away).max(0.05)
-        }
-    }
-
-    /// Glossy radiance from the distributions around the vertices, interpolated (paper, section 5.2).
-    fn interpolated(&self, met: &Met) -> Rgb {
-        let vertices = &self.solution.vertices;
-        let mut sum = Rgb::ZERO;
-        for (vertex, weight) in vertices.interpolation(met.leaf.0, met.hit.uv) {
-            if weight > 0.0 {
-                let around = vertices.leaves_around(vertex);
-                let light: Rgb = around.iter().map(|&leaf| self.leaving(NodeId(leaf), met.away)).sum();
-                sum += light * (weight / around.len().max(1) as f32);
-            }
-        }
-        sum
     }
 
     /// Glossy radiance from the samples that arrive at the point, or along rays where the lobe is narrow.
@@ -197,9 +169,7 @@ impl<'a> RayCaster<'a> {
             }
             return light;
         }
-        let path = self.solution.incident_path(met.leaf);
-        arriving(&self.solution.elements, met.leaf, &path, &place, scratch);
-        light + met.reflector.reflect_sum(scratch, outgoing)
+        light + glossy::reflected(self.solution, &*met.reflector, met.leaf, &place, met.away, 0.0, scratch)
     }
 
     /// What is seen from a point along a direction; nothing below the surface.
@@ -210,11 +180,4 @@ impl<'a> RayCaster<'a> {
         }
         self.radiance(met.hit.point, direction, met.hit.surface, bounce + 1, seed, scratch)
     }
-}
-
-/// Number of leaves that take part in glossy reflection.
-#[must_use]
-pub fn glossy_leaves(solution: &Solution<GlossyField>) -> usize {
-    let nodes = &solution.elements;
-    nodes.patch_leaves().filter(|&leaf| nodes.nodes[leaf as usize].active && nodes.area(NodeId(leaf)) > 0.0).count()
 }
