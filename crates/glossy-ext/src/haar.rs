@@ -148,13 +148,7 @@ impl Haar {
     fn mid_values(&self, corners: [Rgb; 3], node: Node) -> [Rgb; 3] {
         let between = midpoints(corners);
         let mids = node.mids();
-        [0, 1, 2].map(|e| {
-            if mids[e] == Node::NO_VERTEX {
-                between[e]
-            } else {
-                self.vertex(mids[e])
-            }
-        })
+        [0, 1, 2].map(|e| if mids[e] == Node::NO_VERTEX { between[e] } else { self.vertex(mids[e]) })
     }
 
     /// The value in a direction, which need not have unit length. Zero for a direction that is zero or not finite.
@@ -211,15 +205,7 @@ impl Haar {
             }
         };
         self.pieces(enter, &mut |triangle, values| {
-            bound_piece(
-                triangle,
-                values,
-                cone,
-                &test,
-                PIECE_SPLITS,
-                &mut low,
-                &mut high,
-            );
+            bound_piece(triangle, values, cone, &test, PIECE_SPLITS, &mut low, &mut high);
         });
         (low, high) = (low.min(low_inside), high.max(high_inside));
         if low.cmpgt(high).any() {
@@ -254,33 +240,19 @@ impl Haar {
         let mut sum = DVec3::ZERO;
         self.pieces(&mut |_| true, &mut |triangle, values| {
             // The Jacobian varies by 5.2 over a face of the octahedron; a radius of 15° is little enough for degree 5.
-            let wide = [(0.966, 0), (0.85, 1)]
-                .iter()
-                .find(|(cos, _)| triangle.cos_radius() >= *cos)
-                .map_or(2, |w| w.1);
+            let wide = [(0.966, 0), (0.85, 1)].iter().find(|(cos, _)| triangle.cos_radius() >= *cos).map_or(2, |w| w.1);
             let splits = if kink(triangle) { wide + 2 } else { wide };
-            sum += triangle
-                .integrate(values.map(|v| v.as_dvec3()), splits, weight)
-                .0;
+            sum += triangle.integrate(values.map(|v| v.as_dvec3()), splits, weight).0;
         });
         (sum * f64::from(self.scale)).as_vec3()
     }
 
     /// Visits the linear pieces under all triangles that `enter` lets pass, with values in units of the scale.
-    fn pieces(
-        &self,
-        enter: &mut impl FnMut(&Visit) -> bool,
-        piece: &mut impl FnMut(&Triangle, [Rgb; 3]),
-    ) {
+    fn pieces(&self, enter: &mut impl FnMut(&Visit) -> bool, piece: &mut impl FnMut(&Triangle, [Rgb; 3])) {
         for face in 0..8 {
             let triangle = Triangle::new(face_corners(face));
             let vertices = Self::face_vertices(face);
-            let visit = Visit {
-                triangle,
-                vertices,
-                node: self.root(face),
-                level: 0,
-            };
+            let visit = Visit { triangle, vertices, node: self.root(face), level: 0 };
             self.pieces_below(&visit, enter, piece);
         }
     }
@@ -313,10 +285,7 @@ impl Haar {
             let corners = values();
             let mids = self.mid_values(corners, node);
             for child in 0..4 {
-                piece(
-                    &visit.triangle.child(child),
-                    child_corners(corners, mids, child),
-                );
+                piece(&visit.triangle.child(child), child_corners(corners, mids, child));
             }
         }
     }
@@ -362,21 +331,12 @@ impl Haar {
             .map(|(p, &v)| f(p.normalize(), decode(v) * self.scale))
             .map(|v| if v.is_finite() { v } else { Rgb::ZERO })
             .collect();
-        let scale = scale_for(
-            values
-                .iter()
-                .map(|v| v.abs().max_element())
-                .fold(0.0, f32::max),
-        );
+        let scale = scale_for(values.iter().map(|v| v.abs().max_element()).fold(0.0, f32::max));
         if scale == 0.0 {
             return Self::default();
         }
         let vertices = values.iter().map(|&v| encode(v, scale)).collect();
-        Self {
-            scale,
-            vertices,
-            ..self.clone()
-        }
+        Self { scale, vertices, ..self.clone() }
     }
 
     /// Multiplies every value. A factor that is not finite, or that leaves nothing representable, empties.
@@ -492,10 +452,7 @@ fn bound_piece(
     low: &mut Rgb,
     high: &mut Rgb,
 ) {
-    let (min, max) = (
-        values[0].min(values[1]).min(values[2]),
-        values[0].max(values[1]).max(values[2]),
-    );
+    let (min, max) = (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]));
     if min.cmpge(*low).all() && max.cmple(*high).all() || !triangle.touches(test) {
         return;
     }
@@ -507,14 +464,6 @@ fn bound_piece(
     let mids = midpoints(values);
     for child in 0..4 {
         let part = child_corners(values, mids, child);
-        bound_piece(
-            &triangle.child(child),
-            part,
-            cone,
-            test,
-            splits - 1,
-            low,
-            high,
-        );
+        bound_piece(&triangle.child(child), part, cone, test, splits - 1, low, high);
     }
 }

@@ -1,8 +1,8 @@
 //! Illumination Samples (paper, section 3.2): what every link leaves at its receiver, and what of it arrives at an
 //! oriented point further down.
 
-use crate::reflector::Incident;
 use crate::Rgb;
+use crate::reflector::Incident;
 use glam::{Mat3, Vec3};
 use hr_diffuse::{Hierarchy, NodeId, Transfer};
 
@@ -172,6 +172,9 @@ fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Plac
     } else {
         renewal.clamp(MOST_RENEWAL.recip(), MOST_RENEWAL) * cosine
     };
-    (scale > 0.0 && (cosine > 0.0 || extent > 0.0))
-        .then(|| Incident { direction: local, extent, irradiance: sample.irradiance() * scale })
+    (scale > 0.0 && (cosine > 0.0 || extent > 0.0)).then(|| Incident {
+        direction: local,
+        extent,
+        irradiance: sample.irradiance() * scale,
+    })
 }

@@ -15,18 +15,12 @@ pub struct Cone {
 
 impl Cone {
     /// Every direction.
-    pub const SPHERE: Self = Self {
-        axis: Vec3::Z,
-        cos_angle: -1.0,
-    };
+    pub const SPHERE: Self = Self { axis: Vec3::Z, cos_angle: -1.0 };
 
     /// A single direction (unit length).
     #[must_use]
     pub fn single(axis: Vec3) -> Self {
-        Self {
-            axis,
-            cos_angle: 1.0,
-        }
+        Self { axis, cos_angle: 1.0 }
     }
 
     /// Half-angle in radians, 0…π.
@@ -78,18 +72,12 @@ impl Cone {
         }
         let axis = (self.axis * turn.cos() + side * turn.sin()).normalize();
         // A little slack for rounding keeps the union conservative.
-        Self {
-            axis,
-            cos_angle: (half + 1e-3).min(std::f32::consts::PI).cos(),
-        }
+        Self { axis, cos_angle: (half + 1e-3).min(std::f32::consts::PI).cos() }
     }
 
     /// The same directions turned around.
     #[must_use]
     pub fn opposite(&self) -> Self {
-        Self {
-            axis: -self.axis,
-            ..*self
-        }
+        Self { axis: -self.axis, ..*self }
     }
 }

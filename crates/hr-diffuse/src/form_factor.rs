@@ -176,7 +176,9 @@ mod tests {
         let mut sum = 0.0;
         for i in 0..count {
             for j in 0..count {
-                let p = origin + a * ((f64::from(i) + 0.5) / f64::from(count)) + b * ((f64::from(j) + 0.5) / f64::from(count));
+                let p = origin
+                    + a * ((f64::from(i) + 0.5) / f64::from(count))
+                    + b * ((f64::from(j) + 0.5) / f64::from(count));
                 let to = p - x;
                 let d2 = to.length_squared();
                 sum += (to.dot(n).max(0.0) * (-to.dot(normal)).max(0.0)) / (PI * d2 * d2) * area;

@@ -277,11 +277,7 @@ impl Elements {
             let mut child = patch(scene, parent.source, parent.kind, *part, None);
             child.parent = node;
             child.active = parent.active;
-            child.importance = if parent.active {
-                parent.importance
-            } else {
-                child.reflectance.max_element()
-            };
+            child.importance = if parent.active { parent.importance } else { child.reflectance.max_element() };
             self.nodes.push(child);
         }
         let parent = &mut self.nodes[node as usize];
@@ -412,12 +408,10 @@ impl Tree {
     }
 
     fn convert(bvh: &obvhs::bvh2::Bvh2, node: usize, slots: &mut [Option<Element>]) -> Self {
-        let primitives = |n: &obvhs::bvh2::node::Bvh2Node| n.first_index as usize..(n.first_index + n.prim_count) as usize;
+        let primitives =
+            |n: &obvhs::bvh2::node::Bvh2Node| n.first_index as usize..(n.first_index + n.prim_count) as usize;
         let leaf = |node: &obvhs::bvh2::node::Bvh2Node, slots: &mut [Option<Element>]| -> Vec<Tree> {
-            primitives(node)
-                .filter_map(|i| slots[bvh.primitive_indices[i] as usize].take())
-                .map(Tree::Leaf)
-                .collect()
+            primitives(node).filter_map(|i| slots[bvh.primitive_indices[i] as usize].take()).map(Tree::Leaf).collect()
         };
         let start = &bvh.nodes[node];
         if start.is_leaf() {

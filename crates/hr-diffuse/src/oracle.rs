@@ -2,10 +2,10 @@
 //! with them come bounds of the form factor, and with those of the sender's radiosity a minimum and a maximum
 //! of the irradiance that a link carries.
 
+use crate::form_factor::IN_PLANE;
 use crate::hierarchy::{Element, Kind, SceneData};
 use crate::{Cone, LightKind};
 use glam::Vec3;
-use crate::form_factor::IN_PLANE;
 use std::f32::consts::PI;
 
 /// Bounds of what one unit of the sender's radiosity (or intensity, for lights without extent) makes of
@@ -46,11 +46,7 @@ pub fn factor_bounds(scene: &SceneData, receiver: &Element, sender: &Element) ->
         let (_, most) = receiver.normals.cosines_with(&toward);
         (1.0, if most > 0.0 { 1.0 } else { most })
     };
-    let (s_min, s_max) = if sender.whole_sphere {
-        (0.25, 0.25)
-    } else {
-        sender.normals.cosines_with(&from_sender)
-    };
+    let (s_min, s_max) = if sender.whole_sphere { (0.25, 0.25) } else { sender.normals.cosines_with(&from_sender) };
     if r_max <= 0.0 || s_max <= 0.0 {
         return None;
     }

@@ -29,12 +29,7 @@ pub fn unit(hash: u32) -> f32 {
 /// The `i`-th point of the unit 4-cube for a seed.
 #[must_use]
 pub fn point4(seed: u32, i: u32) -> Vec4 {
-    let shift = Vec4::new(
-        unit(hash(seed, 1)),
-        unit(hash(seed, 2)),
-        unit(hash(seed, 3)),
-        unit(hash(seed, 4)),
-    );
+    let shift = Vec4::new(unit(hash(seed, 1)), unit(hash(seed, 2)), unit(hash(seed, 3)), unit(hash(seed, 4)));
     (shift + STEPS * i as f32).fract()
 }
 

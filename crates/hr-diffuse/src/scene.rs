@@ -67,12 +67,7 @@ impl Surface {
     /// A surface with its front as the shape has it and without shading normals.
     #[must_use]
     pub fn new(shape: Shape, material: u32) -> Self {
-        Self {
-            shape,
-            flip: false,
-            material,
-            shading_normals: None,
-        }
+        Self { shape, flip: false, material, shading_normals: None }
     }
 }
 

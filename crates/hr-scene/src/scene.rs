@@ -2,8 +2,8 @@
 
 use crate::texture::{SurfaceAttributes, Texture};
 use crate::{Camera, SceneError, builtin, gltf_file, mgf, obj_file};
-use glossy_ext::{Reflector, Rgb};
 use glam::Vec2;
+use glossy_ext::{Reflector, Rgb};
 use hr_diffuse::{DiffuseMaterial, Light, SceneInput, Surface, SurfaceReflectance};
 use std::path::Path;
 use std::sync::Arc;

@@ -18,11 +18,7 @@ impl Warnings {
             self.list[i].count = self.list[i].count.saturating_add(1);
         } else {
             self.index.insert(text.clone(), self.list.len());
-            self.list.push(Warning {
-                text,
-                first: place(),
-                count: 1,
-            });
+            self.list.push(Warning { text, first: place(), count: 1 });
         }
     }
 

@@ -6,6 +6,9 @@ use clap::{Parser, ValueEnum};
 use std::ffi::OsString;
 use std::path::PathBuf;
 
+const CAMERA_HELP: &str =
+    r#"Where to look from: {"eye":[x,y,z],"target":[x,y,z],"up":[x,y,z],"fov_x":degrees,"width":w,"height":h}"#;
+
 /// Walk through the global illumination of a scene, glossy reflection included.
 ///
 /// The scene is solved once, to the accuracy asked for; then a window opens and you walk. H in the window shows the
@@ -17,8 +20,8 @@ pub struct Args {
     #[arg(value_name = "SCENE", default_value = hr_scene::builtin::DEFAULT)]
     pub scene: String,
 
-    /// Where to look from: {"eye":[x,y,z],"target":[x,y,z],"up":[x,y,z],"fov_x":degrees,"width":w,"height":h}
-    #[arg(long, value_name = "FILE.json")]
+    /// Where to look from: a file with the JSON form of a [`Camera`](hr_scene::Camera)
+    #[arg(long, value_name = "FILE.json", help = CAMERA_HELP)]
     pub camera: Option<PathBuf>,
 
     /// No window: one image; .pfm and .exr hold linear radiance, unclamped, .png is tone-mapped

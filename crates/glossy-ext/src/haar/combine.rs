@@ -23,10 +23,7 @@ impl Haar {
     /// `offset` as in [`Known`](super::Known). Distributions with a weight that is zero or not finite are left out.
     #[must_use]
     pub fn average(distributions: &[(f32, &Self)], settings: &Refinement, offset: Rgb) -> Self {
-        let some = distributions
-            .iter()
-            .copied()
-            .filter(|(w, h)| *w != 0.0 && w.is_finite() && !h.is_empty());
+        let some = distributions.iter().copied().filter(|(w, h)| *w != 0.0 && w.is_finite() && !h.is_empty());
         if some.clone().next().is_none() {
             return Self::default();
         }
@@ -70,14 +67,7 @@ fn cover(mesh: &mut Mesh, tri: u32, haar: &Haar, node: Option<usize>) {
 }
 
 /// Writes the distribution's values (in units of its scale) at the mesh's vertices under a triangle.
-fn deposit(
-    mesh: &Mesh,
-    tri: u32,
-    haar: &Haar,
-    node: Option<usize>,
-    corners: [Rgb; 3],
-    own: &mut [Rgb],
-) {
+fn deposit(mesh: &Mesh, tri: u32, haar: &Haar, node: Option<usize>, corners: [Rgb; 3], own: &mut [Rgb]) {
     let here = &mesh.tris[tri as usize];
     for (vertex, value) in std::iter::zip(here.corners, corners) {
         own[usize::from(vertex)] = value;
@@ -87,14 +77,7 @@ fn deposit(
     if here.is_divided() {
         for child in 0..4 {
             let values = child_corners(corners, mids, child);
-            deposit(
-                mesh,
-                here.children + child as u32,
-                haar,
-                node.child(child),
-                values,
-                own,
-            );
+            deposit(mesh, here.children + child as u32, haar, node.child(child), values, own);
         }
     } else {
         for (vertex, value) in std::iter::zip(here.mids, mids).filter(|(v, _)| *v != NO_VERTEX) {
@@ -112,18 +95,13 @@ struct Summary {
 }
 
 fn summaries(mesh: &Mesh) -> Vec<Summary> {
-    let zero = Summary {
-        variation: Variation::default(),
-        mean: Rgb::ZERO,
-        center: Rgb::ZERO,
-    };
+    let zero = Summary { variation: Variation::default(), mean: Rgb::ZERO, center: Rgb::ZERO };
     let mut all = vec![zero; mesh.tris.len()];
     // Children come after their parents.
     for (index, tri) in mesh.tris.iter().enumerate().rev() {
         let (corners, mids) = (mesh.corner_values(tri), mesh.mid_values(tri));
         // How far the midpoints are from the chords of their edges.
-        let bend =
-            std::iter::zip(mids, midpoints(corners)).map(|(m, b)| (m - b).abs().max_element());
+        let bend = std::iter::zip(mids, midpoints(corners)).map(|(m, b)| (m - b).abs().max_element());
         let bend = bend.fold(0.0, f32::max);
         all[index] = if tri.is_divided() {
             let first = tri.children as usize;
@@ -141,16 +119,9 @@ fn summaries(mesh: &Mesh) -> Vec<Summary> {
             }
         } else {
             let values = || corners.iter().chain(&mids).copied();
-            let (low, high) = (
-                values().fold(Rgb::MAX, Rgb::min),
-                values().fold(Rgb::MIN, Rgb::max),
-            );
+            let (low, high) = (values().fold(Rgb::MAX, Rgb::min), values().fold(Rgb::MIN, Rgb::max));
             Summary {
-                variation: Variation {
-                    low,
-                    high,
-                    deviation: bend,
-                },
+                variation: Variation { low, high, deviation: bend },
                 mean: mesh.mean(tri),
                 center: mids.iter().sum::<Rgb>() / 3.0,
             }
@@ -162,11 +133,7 @@ fn summaries(mesh: &Mesh) -> Vec<Summary> {
 /// A mesh that is divided only where the refiner asks for it.
 fn coarsen(fine: &Mesh, settings: &Refinement, offset: Rgb) -> Mesh {
     let all = summaries(fine);
-    let largest = fine
-        .values
-        .iter()
-        .map(|v| v.abs().max_element())
-        .fold(0.0, f32::max);
+    let largest = fine.values.iter().map(|v| v.abs().max_element()).fold(0.0, f32::max);
     let mut octahedron = fine.values.iter();
     let mut mesh = Mesh::new(|_| octahedron.next().copied().unwrap_or_default());
     let mut index = 0;
@@ -177,17 +144,14 @@ fn coarsen(fine: &Mesh, settings: &Refinement, offset: Rgb) -> Mesh {
         let tri = mesh.tris[index];
         let (there, what) = (fine.tris[same[index] as usize], all[same[index] as usize]);
         let wanted = tri.level < settings.max_level()
-            && (tri.level < settings.min_level()
-                || settings.is_rough(&what.variation, what.center + offset, largest));
+            && (tri.level < settings.min_level() || settings.is_rough(&what.variation, what.center + offset, largest));
         if !tri.is_divided() && there.is_divided() && wanted {
             mesh.divide(index as u32, &mut |m: &Midpoint| {
                 let mids = fine.tris[same[m.tri as usize] as usize].mids;
                 fine.values[usize::from(mids[m.edge])]
             });
             for new in &mesh.tris[same.len()..] {
-                same.push(
-                    fine.tris[same[new.parent as usize] as usize].children + u32::from(new.place),
-                );
+                same.push(fine.tris[same[new.parent as usize] as usize].children + u32::from(new.place));
             }
         }
         index += 1;

@@ -26,11 +26,7 @@ const UNBIAS: f32 = f32::from_bits((127 - 112) << 23);
 pub(super) fn scale_for(largest: f32) -> f32 {
     let scale = largest / TOP;
     // Below this, 1/scale overflows.
-    if scale < f32::MIN_POSITIVE {
-        0.0
-    } else {
-        scale
-    }
+    if scale < f32::MIN_POSITIVE { 0.0 } else { scale }
 }
 
 /// Rounds to the nearest stored value; `value` is in units of the scale, at most [`TOP`] in size.
@@ -60,11 +56,7 @@ pub(super) fn encode(value: Rgb, scale: f32) -> Half3 {
 /// The stored value, still in units of the scale.
 #[inline]
 pub(super) fn decode(stored: Half3) -> Rgb {
-    Rgb::new(
-        decode_one(stored[0]),
-        decode_one(stored[1]),
-        decode_one(stored[2]),
-    )
+    Rgb::new(decode_one(stored[0]), decode_one(stored[1]), decode_one(stored[2]))
 }
 
 #[cfg(test)]
@@ -78,11 +70,7 @@ mod tests {
             for i in 0..390 {
                 let v = magnitude * 0.95_f32.powi(i);
                 let back = decode(encode(Rgb::new(v, -v, 0.0), scale)) * scale;
-                assert!(
-                    (back.x - v).abs() <= v / 2048.0,
-                    "{v} came back as {}",
-                    back.x
-                );
+                assert!((back.x - v).abs() <= v / 2048.0, "{v} came back as {}", back.x);
                 assert_eq!(back.x, -back.y, "sign is lost");
                 assert_eq!(back.z, 0.0, "zero is not exact");
             }

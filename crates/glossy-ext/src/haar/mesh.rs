@@ -91,19 +91,11 @@ impl Mesh {
                 level: 0,
             })
             .collect();
-        Self {
-            tris,
-            positions,
-            values,
-        }
+        Self { tris, positions, values }
     }
 
     pub(super) fn triangle(&self, tri: u32) -> Triangle {
-        Triangle::new(
-            self.tris[tri as usize]
-                .corners
-                .map(|v| self.positions[usize::from(v)]),
-        )
+        Triangle::new(self.tris[tri as usize].corners.map(|v| self.positions[usize::from(v)]))
     }
 
     pub(super) fn corner_values(&self, tri: &Tri) -> [Rgb; 3] {
@@ -144,29 +136,18 @@ impl Mesh {
         if self.positions.len() + 3 > MAX_VERTICES {
             return false;
         }
-        let Tri {
-            corners,
-            neighbours,
-            level,
-            ..
-        } = self.tris[tri as usize];
+        let Tri { corners, neighbours, level, .. } = self.tris[tri as usize];
         for edge in 0..3 {
             if self.tris[tri as usize].mids[edge] == NO_VERTEX {
                 let [a, b] = EDGE_ENDS[edge].map(|i| usize::from(corners[i]));
                 let position = 0.5 * (self.positions[a] + self.positions[b]);
                 let between = 0.5 * self.values[a] + 0.5 * self.values[b];
                 let vertex = self.positions.len() as u16;
-                self.values.push(value(&Midpoint {
-                    tri,
-                    edge,
-                    position,
-                    between,
-                }));
+                self.values.push(value(&Midpoint { tri, edge, position, between }));
                 self.positions.push(position);
                 self.tris[tri as usize].mids[edge] = vertex;
                 let across = &mut self.tris[neighbours[edge] as usize];
-                let opposite =
-                    across.corner_off(corners[EDGE_ENDS[edge][0]], corners[EDGE_ENDS[edge][1]]);
+                let opposite = across.corner_off(corners[EDGE_ENDS[edge][0]], corners[EDGE_ENDS[edge][1]]);
                 across.mids[opposite] = vertex;
             }
         }
@@ -217,12 +198,7 @@ impl Mesh {
         let mut mass = vec![0.0_f32; n];
         let mut low = self.values.clone();
         let mut high = self.values.clone();
-        for (t, tri) in self
-            .tris
-            .iter()
-            .enumerate()
-            .filter(|(_, tri)| !tri.is_divided())
-        {
+        for (t, tri) in self.tris.iter().enumerate().filter(|(_, tri)| !tri.is_divided()) {
             let solid_angle = self.triangle(t as u32).rough_solid_angle();
             let lack = means[t].map_or(Rgb::ZERO, |mean| mean - self.mean(tri));
             let mut share = |vertex: u16, part: f32| {
@@ -236,9 +212,7 @@ impl Mesh {
             };
             // Of the 12 corners of the four children, one is at each corner and three at each midpoint.
             for (corner, &vertex) in tri.corners.iter().enumerate() {
-                let missing = (0..3)
-                    .filter(|&e| e != corner && tri.mids[e] == NO_VERTEX)
-                    .count();
+                let missing = (0..3).filter(|&e| e != corner && tri.mids[e] == NO_VERTEX).count();
                 share(vertex, (1.0 + 1.5 * missing as f32) / 12.0);
             }
             for &vertex in tri.mids.iter().filter(|&&v| v != NO_VERTEX) {
@@ -262,17 +236,12 @@ impl Mesh {
     /// Packs the mesh. Values that are not finite become 0; a mesh of zeros becomes the empty distribution.
     pub(super) fn pack(&self) -> Haar {
         let finite = |v: Rgb| if v.is_finite() { v } else { Rgb::ZERO };
-        let largest = self
-            .values
-            .iter()
-            .map(|&v| finite(v).abs().max_element())
-            .fold(0.0, f32::max);
+        let largest = self.values.iter().map(|&v| finite(v).abs().max_element()).fold(0.0, f32::max);
         let scale = scale_for(largest);
         if scale == 0.0 {
             return Haar::default();
         }
-        let with_node =
-            |tris: std::ops::Range<u32>| tris.filter(|&t| self.tris[t as usize].has_node());
+        let with_node = |tris: std::ops::Range<u32>| tris.filter(|&t| self.tris[t as usize].has_node());
         let mut order: Vec<u32> = with_node(0..8).collect();
         let roots = order.iter().fold(0_u8, |mask, &face| mask | 1 << face);
         let mut nodes = Vec::with_capacity(self.tris.len() / 4);
@@ -283,34 +252,20 @@ impl Mesh {
             let mut mask = 0;
             if tri.is_divided() {
                 order.extend(with_node(tri.children..tri.children + 4));
-                mask = order[base..]
-                    .iter()
-                    .fold(0, |mask, &t| mask | 1 << (t - tri.children));
+                mask = order[base..].iter().fold(0, |mask, &t| mask | 1 << (t - tri.children));
             }
             nodes.push(Node::new(tri.mids, base, mask));
             next += 1;
         }
-        let vertices = self
-            .values
-            .iter()
-            .map(|&v| encode(finite(v), scale))
-            .collect();
-        Haar {
-            scale,
-            roots,
-            vertices,
-            nodes: nodes.into_boxed_slice(),
-        }
+        let vertices = self.values.iter().map(|&v| encode(finite(v), scale)).collect();
+        Haar { scale, roots, vertices, nodes: nodes.into_boxed_slice() }
     }
 }
 
 impl Tri {
     /// The corner that is neither of two.
     fn corner_off(&self, a: u16, b: u16) -> usize {
-        self.corners
-            .iter()
-            .position(|&c| c != a && c != b)
-            .unwrap_or(0)
+        self.corners.iter().position(|&c| c != a && c != b).unwrap_or(0)
     }
 
     /// The corner at a vertex.
@@ -328,11 +283,7 @@ mod tests {
     fn faces_use_the_vertices_on_their_axes() {
         let mesh = Mesh::new(|p| p);
         for face in 0..8 {
-            assert_eq!(
-                mesh.triangle(face).corners,
-                face_corners(face as usize),
-                "face {face}"
-            );
+            assert_eq!(mesh.triangle(face).corners, face_corners(face as usize), "face {face}");
         }
     }
 }

@@ -66,13 +66,8 @@ impl Refinement {
     }
 
     /// The settings of the paper's table 3: ε = 0.5, levels 1 to 5, interpolation of samples.
-    pub const PAPER: Self = Self {
-        min_level: 1,
-        max_level: 5,
-        refiner: Refiner::Relative(0.5),
-        negligible: 0.0,
-        preserve_energy: false,
-    };
+    pub const PAPER: Self =
+        Self { min_level: 1, max_level: 5, refiner: Refiner::Relative(0.5), negligible: 0.0, preserve_energy: false };
 
     /// Whether a triangle must be subdivided. `center` includes the offset; `largest` is the largest component met
     /// so far.
@@ -139,11 +134,7 @@ pub struct Known<'a> {
 
 impl Known<'_> {
     /// Nothing: the whole sphere, no offset, no peaks.
-    pub const NOTHING: Known<'static> = Known {
-        support: None,
-        offset: Rgb::ZERO,
-        peaks: &[],
-    };
+    pub const NOTHING: Known<'static> = Known { support: None, offset: Rgb::ZERO, peaks: &[] };
 }
 
 /// A projection and what it took.
@@ -201,8 +192,7 @@ fn contains(cone: &Cone, direction: Vec3) -> bool {
 
 /// The direction of a cone's border nearest to one outside.
 fn onto_border(cone: &Cone, direction: Vec3) -> Vec3 {
-    let aside = (direction - cone.axis * cone.axis.dot(direction))
-        .normalize_or(cone.axis.any_orthonormal_vector());
+    let aside = (direction - cone.axis * cone.axis.dot(direction)).normalize_or(cone.axis.any_orthonormal_vector());
     let cos = cone.cos_angle.clamp(-1.0, 1.0);
     (cone.axis * cos + aside * (1.0 - cos * cos).max(0.0).sqrt()).normalize()
 }
@@ -212,12 +202,8 @@ fn peak_test(peak: &Peak, max_level: u8) -> Option<(ConeTest, u8)> {
     if !peak.direction.is_finite() || peak.direction == Vec3::ZERO {
         return None;
     }
-    let level = (0..max_level)
-        .find(|&l| std::f32::consts::FRAC_PI_2 * 0.5_f32.powi(l.into()) <= peak.width);
-    let cone = Cone {
-        axis: peak.direction.normalize(),
-        cos_angle: peak.width.clamp(0.0, std::f32::consts::PI).cos(),
-    };
+    let level = (0..max_level).find(|&l| std::f32::consts::FRAC_PI_2 * 0.5_f32.powi(l.into()) <= peak.width);
+    let cone = Cone { axis: peak.direction.normalize(), cos_angle: peak.width.clamp(0.0, std::f32::consts::PI).cos() };
     Some((ConeTest::new(&cone), level.unwrap_or(max_level)))
 }
 
@@ -236,28 +222,14 @@ impl Haar {
     /// many triangles share them. Values that are not finite count as 0.
     ///
     /// Depends on nothing but the arguments: the same function gives the same distribution, bit by bit.
-    pub fn project(
-        settings: &Refinement,
-        known: &Known<'_>,
-        f: impl FnMut(Vec3) -> Rgb,
-    ) -> Projected {
+    pub fn project(settings: &Refinement, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected {
         let (min_level, max_level) = (settings.min_level(), settings.max_level());
         let support = known.support.as_ref();
         let within = support.map(|s| ConeTest::new(&s.cone));
-        let peaks: Vec<_> = known
-            .peaks
-            .iter()
-            .filter_map(|p| peak_test(p, max_level))
-            .collect();
+        let peaks: Vec<_> = known.peaks.iter().filter_map(|p| peak_test(p, max_level)).collect();
         let peak_level = peaks.iter().map(|p| p.1).max().unwrap_or(0);
 
-        let mut sampler = Sampler {
-            f,
-            support,
-            evaluations: 0,
-            not_finite: 0,
-            largest: 0.0,
-        };
+        let mut sampler = Sampler { f, support, evaluations: 0, not_finite: 0, largest: 0.0 };
         let mut mesh = Mesh::new(|p| sampler.at(p));
         let mut findings = vec![Finding::default(); mesh.tris.len()];
         let mut truncated = false;
@@ -277,10 +249,7 @@ impl Haar {
             }
             let may_divide = tri.level < max_level && !truncated;
             let forced = tri.level < min_level
-                || tri.level < peak_level
-                    && peaks
-                        .iter()
-                        .any(|(c, l)| tri.level < *l && triangle.touches(c));
+                || tri.level < peak_level && peaks.iter().any(|(c, l)| tri.level < *l && triangle.touches(c));
             let divide = may_divide
                 && (forced || {
                     let center = center_of(&mut findings[index], &mut sampler, &triangle);
@@ -300,29 +269,14 @@ impl Haar {
         if settings.preserve_energy {
             keep_means(&mut mesh, &findings, support);
         }
-        let Sampler {
-            evaluations,
-            not_finite,
-            ..
-        } = sampler;
-        Projected {
-            haar: mesh.pack(),
-            evaluations,
-            not_finite,
-            truncated,
-        }
+        let Sampler { evaluations, not_finite, .. } = sampler;
+        Projected { haar: mesh.pack(), evaluations, not_finite, truncated }
     }
 }
 
 /// The sample in the middle of a triangle, taken once. It counts as zero outside the support.
-fn center_of(
-    finding: &mut Finding,
-    sampler: &mut Sampler<'_, impl FnMut(Vec3) -> Rgb>,
-    triangle: &Triangle,
-) -> Rgb {
-    *finding
-        .center
-        .get_or_insert_with(|| sampler.at(triangle.center()))
+fn center_of(finding: &mut Finding, sampler: &mut Sampler<'_, impl FnMut(Vec3) -> Rgb>, triangle: &Triangle) -> Rgb {
+    *finding.center.get_or_insert_with(|| sampler.at(triangle.center()))
 }
 
 /// Variation of the samples inside the support: the step at its border is no reason to subdivide.
@@ -335,8 +289,7 @@ fn variation(
 ) -> Variation {
     let corners = mesh.corner_values(tri);
     let mut range: Option<(Rgb, Rgb)> = None;
-    let mut extend =
-        |v: Rgb| range = Some(range.map_or((v, v), |(low, high)| (low.min(v), high.max(v))));
+    let mut extend = |v: Rgb| range = Some(range.map_or((v, v), |(low, high)| (low.min(v), high.max(v))));
     let mut all_inside = true;
     for (position, value) in std::iter::zip(triangle.corners, corners) {
         if sampler.is_inside(position) {
@@ -357,26 +310,15 @@ fn variation(
     }
     let (low, high) = range.unwrap_or_default();
     // Across the border the interpolation is unknown. A parabola deviates from its chord by a quarter of its range.
-    let deviation = if all_inside {
-        deviation
-    } else {
-        (high - low) * 0.25
-    };
-    Variation {
-        low,
-        high,
-        deviation: deviation.max_element(),
-    }
+    let deviation = if all_inside { deviation } else { (high - low) * 0.25 };
+    Variation { low, high, deviation: deviation.max_element() }
 }
 
 /// Findings for triangles that are new: the middle of a triangle is the middle of its middle child.
 fn inherit(mesh: &Mesh, findings: &mut Vec<Finding>) {
     for tri in &mesh.tris[findings.len()..] {
         let Finding { center, accepted } = findings[tri.parent as usize];
-        findings.push(Finding {
-            center: center.filter(|_| tri.place == 3),
-            accepted,
-        });
+        findings.push(Finding { center: center.filter(|_| tri.place == 3), accepted });
     }
 }
 
@@ -390,12 +332,7 @@ fn keep_means(mesh: &mut Mesh, findings: &[Finding], support: Option<&Support>) 
     let means: Vec<Option<Rgb>> = std::iter::zip(&mesh.tris, findings)
         .map(|(tri, finding)| {
             // The mean of a triangle that the border cuts is not known from its samples.
-            if support.is_some()
-                && tri
-                    .corners
-                    .iter()
-                    .any(|&v| outside(mesh.positions[usize::from(v)]))
-            {
+            if support.is_some() && tri.corners.iter().any(|&v| outside(mesh.positions[usize::from(v)])) {
                 return None;
             }
             let center = finding.center.filter(|_| !tri.is_divided())?;

@@ -8,19 +8,11 @@ use std::f32::consts::{PI, TAU};
 const STORED: f32 = 1.0 / 2048.0;
 
 fn settings(min_level: u8, max_level: u8, epsilon: f32) -> Refinement {
-    Refinement {
-        min_level,
-        max_level,
-        refiner: Refiner::Relative(epsilon),
-        ..Refinement::default()
-    }
+    Refinement { min_level, max_level, refiner: Refiner::Relative(epsilon), ..Refinement::default() }
 }
 
 fn exact(min_level: u8, max_level: u8, epsilon: f32) -> Refinement {
-    Refinement {
-        preserve_energy: false,
-        ..settings(min_level, max_level, epsilon)
-    }
+    Refinement { preserve_energy: false, ..settings(min_level, max_level, epsilon) }
 }
 
 fn project(settings: &Refinement, f: impl FnMut(Vec3) -> Rgb) -> Haar {
@@ -75,10 +67,7 @@ fn assert_balanced(haar: &Haar) {
                 let on = triangle.corners[a].lerp(triangle.corners[b], along);
                 let across = on + (on - triangle.center()).reject_from(on).normalize() * 1e-4;
                 let other = level_at(haar, across);
-                assert!(
-                    level.abs_diff(other) <= 1,
-                    "level {level} beside {other} at {on}"
-                );
+                assert!(level.abs_diff(other) <= 1, "level {level} beside {other} at {on}");
             }
         }
     }
@@ -89,36 +78,21 @@ fn constants_are_reproduced_exactly() {
     for value in [1e-20_f32, 0.37, 1.0, 12345.678, 1e20] {
         for level in 0..=4 {
             let grey = project(&settings(level, level, 0.1), |_| Rgb::splat(value));
-            assert_eq!(
-                grey.basis_functions(),
-                8 << (2 * level),
-                "uniform subdivision"
-            );
+            assert_eq!(grey.basis_functions(), 8 << (2 * level), "uniform subdivision");
             for d in directions(300) {
                 let error = (grey.eval(d) - Rgb::splat(value)).abs().max_element();
-                assert!(
-                    error <= 4.0 * f32::EPSILON * value,
-                    "{value} at {d}: off by {error}"
-                );
+                assert!(error <= 4.0 * f32::EPSILON * value, "{value} at {d}: off by {error}");
             }
         }
-        let (low, high) =
-            project(&settings(2, 2, 0.1), |_| Rgb::splat(-value)).bounds(&Cone::SPHERE);
-        assert!(
-            (low.x + value).abs() <= 1e-5 * value && (high.x + value).abs() <= 1e-5 * value,
-            "signed bounds"
-        );
+        let (low, high) = project(&settings(2, 2, 0.1), |_| Rgb::splat(-value)).bounds(&Cone::SPHERE);
+        assert!((low.x + value).abs() <= 1e-5 * value && (high.x + value).abs() <= 1e-5 * value, "signed bounds");
     }
 }
 
 /// A function that is linear on the faces of the octahedron is reproduced up to the rounding of stored values.
 #[test]
 fn linear_functions_are_reproduced() {
-    let gradient = [
-        Rgb::new(1.0, -2.0, 0.5),
-        Rgb::new(0.3, 0.1, -1.0),
-        Rgb::new(-0.7, 2.0, 1.5),
-    ];
+    let gradient = [Rgb::new(1.0, -2.0, 0.5), Rgb::new(0.3, 0.1, -1.0), Rgb::new(-0.7, 2.0, 1.5)];
     let f = |d: Vec3| {
         let p = d / d.abs().element_sum();
         Rgb::splat(0.2) + p.x * gradient[0] + p.y * gradient[1] + p.z * gradient[2]
@@ -138,9 +112,7 @@ fn interpolation_is_of_second_order() {
     let f = |d: Vec3| Rgb::new(1.0 + d.x, 2.0 + d.y * d.z, (d.z - 0.5 * d.x).exp());
     let error = |level| {
         let haar = project(&exact(level, level, 0.1), f);
-        directions(4000)
-            .map(|d| (haar.eval(d) - f(d)).abs().max_element())
-            .fold(0.0, f32::max)
+        directions(4000).map(|d| (haar.eval(d) - f(d)).abs().max_element()).fold(0.0, f32::max)
     };
     let errors: Vec<f32> = (2..=5).map(error).collect();
     for pair in errors.windows(2) {
@@ -153,17 +125,11 @@ fn solid_angles_add_up_to_the_sphere() {
     for level in 0..=4 {
         let one = project(&settings(level, level, 0.1), |_| Rgb::ONE);
         let integral = one.integral().x;
-        assert!(
-            (integral - 4.0 * PI).abs() < 2e-5 * 4.0 * PI,
-            "level {level}: {integral}"
-        );
+        assert!((integral - 4.0 * PI).abs() < 2e-5 * 4.0 * PI, "level {level}: {integral}");
         for normal in directions(50) {
             // The kink at the horizon is what the quadrature does not resolve: a strip one part wide.
             let cosine = one.cosine_integral(normal).x;
-            assert!(
-                (cosine - PI).abs() < 2e-3 * PI,
-                "level {level}, {normal}: {cosine}"
-            );
+            assert!((cosine - PI).abs() < 2e-3 * PI, "level {level}, {normal}: {cosine}");
         }
     }
 }
@@ -186,10 +152,7 @@ fn integrals_of_lobes_converge() {
         };
         let errors = [error(2), error(3), error(4), error(5)];
         assert!(errors[3] < 0.01, "cos^{exponent}: {errors:?}");
-        assert!(
-            errors[3] < errors[1].max(1e-3) && errors[2] < errors[0].max(1e-3),
-            "cos^{exponent}: {errors:?}"
-        );
+        assert!(errors[3] < errors[1].max(1e-3) && errors[2] < errors[0].max(1e-3), "cos^{exponent}: {errors:?}");
     }
 }
 
@@ -200,22 +163,9 @@ fn quality(settings: &Refinement, exponent: f32) -> [f32; 3] {
     let mut mean = [0.0; 3];
     for axis in directions(axes) {
         let f = lobe(axis, exponent);
-        let peaks = [Peak {
-            direction: axis,
-            width: 1.0 / exponent.sqrt(),
-        }];
-        let haar = Haar::project(
-            settings,
-            &Known {
-                peaks: &peaks,
-                ..Known::NOTHING
-            },
-            &f,
-        )
-        .haar;
-        let l1: f32 = directions(samples)
-            .map(|d| (haar.eval(d).x - f(d).x).abs())
-            .sum();
+        let peaks = [Peak { direction: axis, width: 1.0 / exponent.sqrt() }];
+        let haar = Haar::project(settings, &Known { peaks: &peaks, ..Known::NOTHING }, &f).haar;
+        let l1: f32 = directions(samples).map(|d| (haar.eval(d).x - f(d).x).abs()).sum();
         mean[0] += haar.basis_functions() as f32 / axes as f32;
         mean[1] += (haar.integral().x / truth - 1.0).abs() / axes as f32;
         mean[2] += l1 / samples as f32 * 4.0 * PI / truth / axes as f32;
@@ -227,10 +177,7 @@ fn quality(settings: &Refinement, exponent: f32) -> [f32; 3] {
 fn defaults_are_as_good_as_documented() {
     for exponent in [10.0, 60.0, 300.0] {
         let [functions, energy, l1] = quality(&Refinement::default(), exponent);
-        assert!(
-            (500.0..1600.0).contains(&functions),
-            "cos^{exponent}: {functions} basis functions"
-        );
+        assert!((500.0..1600.0).contains(&functions), "cos^{exponent}: {functions} basis functions");
         assert!(energy < 0.005, "cos^{exponent}: energy off by {energy}");
         assert!(l1 < 0.03, "cos^{exponent}: mean error {l1}");
     }
@@ -248,17 +195,8 @@ fn means_are_preserved() {
 #[test]
 fn interpolation_refiner_saves_basis_functions() {
     let paper = quality(&exact(1, 6, 0.5), 10.0);
-    let ours = quality(
-        &Refinement {
-            refiner: Refiner::Interpolation(0.05),
-            ..exact(1, 6, 0.5)
-        },
-        10.0,
-    );
-    assert!(
-        ours[0] < 0.6 * paper[0] && ours[2] < 1.1 * paper[2],
-        "{paper:?}, {ours:?}"
-    );
+    let ours = quality(&Refinement { refiner: Refiner::Interpolation(0.05), ..exact(1, 6, 0.5) }, 10.0);
+    assert!(ours[0] < 0.6 * paper[0] && ours[2] < 1.1 * paper[2], "{paper:?}, {ours:?}");
 }
 
 #[test]
@@ -269,50 +207,30 @@ fn evaluations_are_counted_and_shared() {
         d
     });
     assert_eq!(made.evaluations, calls, "count");
-    assert_eq!(
-        calls,
-        4 * 64 + 2,
-        "once per vertex of the uniform octahedron"
-    );
+    assert_eq!(calls, 4 * 64 + 2, "once per vertex of the uniform octahedron");
     let made = Haar::project(&settings(3, 3, 0.1), &Known::NOTHING, |d| d);
-    assert_eq!(
-        made.evaluations,
-        4 * 64 + 2 + 8 * 64,
-        "and once per triangle"
-    );
+    assert_eq!(made.evaluations, 4 * 64 + 2 + 8 * 64, "and once per triangle");
 }
 
 #[test]
 fn nothing_is_sampled_outside_the_support() {
     let normal = Vec3::new(0.4, 0.5, -0.7).normalize();
-    let cone = Cone {
-        axis: normal,
-        cos_angle: 0.0,
-    };
+    let cone = Cone { axis: normal, cos_angle: 0.0 };
     let f = |d: Vec3| {
         assert!(d.dot(normal) >= -1e-6, "sampled below the horizon at {d}");
         Rgb::ONE
     };
     for beyond in [Beyond::Zero, Beyond::Continued] {
-        let known = Known {
-            support: Some(Support { cone, beyond }),
-            ..Known::NOTHING
-        };
+        let known = Known { support: Some(Support { cone, beyond }), ..Known::NOTHING };
         let made = Haar::project(&settings(2, 5, 0.3), &known, f);
-        assert!(
-            made.haar.basis_functions() <= 128,
-            "a step at the horizon is no reason to subdivide"
-        );
+        assert!(made.haar.basis_functions() <= 128, "a step at the horizon is no reason to subdivide");
         for d in directions(2000).filter(|d| d.dot(normal) > 0.6) {
             assert!((made.haar.eval(d).x - 1.0).abs() < 1e-6, "inside, {d}");
         }
         let at_horizon = directions(2000).filter(|d| (0.0..0.01).contains(&d.dot(normal)));
         if beyond == Beyond::Continued {
             at_horizon.for_each(|d| {
-                assert!(
-                    (made.haar.eval(d).x - 1.0).abs() < 1e-6,
-                    "at the horizon, {d}"
-                );
+                assert!((made.haar.eval(d).x - 1.0).abs() < 1e-6, "at the horizon, {d}");
             });
         } else {
             let opposite = made.haar.eval(-normal).x;
@@ -328,35 +246,18 @@ fn peaks_are_found() {
     let exponent = 1.0 / (sigma * sigma);
     let truth = TAU / (exponent + 1.0);
     for axis in directions(40) {
-        let peaks = [Peak {
-            direction: axis,
-            width: sigma,
-        }];
-        let known = Known {
-            peaks: &peaks,
-            ..Known::NOTHING
-        };
+        let peaks = [Peak { direction: axis, width: sigma }];
+        let known = Known { peaks: &peaks, ..Known::NOTHING };
         let made = Haar::project(&settings(1, 8, 0.5), &known, lobe(axis, exponent));
         let ratio = made.haar.integral().x / truth;
         assert!((ratio - 1.0).abs() < 0.03, "{axis}: {ratio} of the energy");
-        assert!(
-            (made.haar.eval(axis).x - 1.0).abs() < 0.15,
-            "{axis}: peak {}",
-            made.haar.eval(axis)
-        );
-        assert!(
-            made.evaluations < 3000,
-            "{axis}: {} evaluations",
-            made.evaluations
-        );
+        assert!((made.haar.eval(axis).x - 1.0).abs() < 0.15, "{axis}: peak {}", made.haar.eval(axis));
+        assert!(made.evaluations < 3000, "{axis}: {} evaluations", made.evaluations);
     }
     let axis = Vec3::new(0.31, 0.43, 0.57).normalize();
     let narrow = |d: Vec3| lobe(axis, exponent)(d) * f32::from(d.dot(axis) > (3.0 * sigma).cos());
     let blind = project(&settings(1, 8, 0.5), narrow).integral().x / truth;
-    assert!(
-        blind < 0.5,
-        "without its direction {blind} of the energy is found"
-    );
+    assert!(blind < 0.5, "without its direction {blind} of the energy is found");
 }
 
 #[test]
@@ -365,54 +266,22 @@ fn refiners_differ_in_the_dark() {
     // A dim lobe far from a bright one.
     let f = |d: Vec3| lobe(axis, 50.0)(d) * 100.0 + lobe(-axis, 50.0)(d) * 0.5 + 0.01;
     let relative = project(&settings(1, 5, 0.3), f);
-    let absolute = Haar::project(
-        &Refinement {
-            refiner: Refiner::Absolute(5.0),
-            ..settings(1, 5, 0.3)
-        },
-        &Known::NOTHING,
-        f,
-    );
-    assert!(
-        level_at(&relative, -axis) > 3,
-        "relative: level {}",
-        level_at(&relative, -axis)
-    );
-    assert!(
-        level_at(&absolute.haar, -axis) <= 2,
-        "absolute: level {}",
-        level_at(&absolute.haar, -axis)
-    );
+    let absolute =
+        Haar::project(&Refinement { refiner: Refiner::Absolute(5.0), ..settings(1, 5, 0.3) }, &Known::NOTHING, f);
+    assert!(level_at(&relative, -axis) > 3, "relative: level {}", level_at(&relative, -axis));
+    assert!(level_at(&absolute.haar, -axis) <= 2, "absolute: level {}", level_at(&absolute.haar, -axis));
     // Beside a diffuse radiance of 100 the dim one is negligible to the relative refiner, too.
-    let known = Known {
-        offset: Rgb::splat(100.0),
-        ..Known::NOTHING
-    };
+    let known = Known { offset: Rgb::splat(100.0), ..Known::NOTHING };
     let beside = Haar::project(&settings(1, 5, 0.3), &known, f).haar;
-    assert!(
-        level_at(&beside, -axis) <= 2,
-        "beside diffuse light: level {}",
-        level_at(&beside, -axis)
-    );
-    assert!(
-        beside.basis_functions() < relative.basis_functions(),
-        "fewer basis functions"
-    );
+    assert!(level_at(&beside, -axis) <= 2, "beside diffuse light: level {}", level_at(&beside, -axis));
+    assert!(beside.basis_functions() < relative.basis_functions(), "fewer basis functions");
 }
 
 /// The flanks of a narrow lobe are dark, and every difference there is relatively large.
 #[test]
 fn negligible_values_are_not_refined() {
     let axis = Vec3::new(0.2, 0.3, 0.9).normalize();
-    let count = |negligible| {
-        project(
-            &Refinement {
-                negligible,
-                ..settings(1, 6, 0.3)
-            },
-            lobe(axis, 300.0),
-        )
-    };
+    let count = |negligible| project(&Refinement { negligible, ..settings(1, 6, 0.3) }, lobe(axis, 300.0));
     let (paper, ours) = (count(0.0), count(1e-3));
     assert!(
         2 * ours.basis_functions() < paper.basis_functions(),
@@ -420,9 +289,7 @@ fn negligible_values_are_not_refined() {
         ours.basis_functions(),
         paper.basis_functions()
     );
-    let worst = directions(5000)
-        .map(|d| (paper.eval(d) - ours.eval(d)).abs().x)
-        .fold(0.0, f32::max);
+    let worst = directions(5000).map(|d| (paper.eval(d) - ours.eval(d)).abs().x).fold(0.0, f32::max);
     assert!(worst < 0.02, "and it costs {worst} of the peak");
 }
 
@@ -436,18 +303,9 @@ fn values_that_are_not_finite_become_zero() {
     assert!(made.not_finite > 10, "{}", made.not_finite);
     for d in directions(2000) {
         let v = made.haar.eval(d);
-        assert!(
-            v.is_finite() && v.cmpge(Rgb::ZERO).all() && v.cmple(Rgb::splat(1.0 + 1e-6)).all(),
-            "{v} at {d}"
-        );
+        assert!(v.is_finite() && v.cmpge(Rgb::ZERO).all() && v.cmple(Rgb::splat(1.0 + 1e-6)).all(), "{v} at {d}");
     }
-    for d in [
-        Vec3::ZERO,
-        Vec3::NAN,
-        Vec3::INFINITY,
-        Vec3::MAX,
-        Vec3::splat(1e-45),
-    ] {
+    for d in [Vec3::ZERO, Vec3::NAN, Vec3::INFINITY, Vec3::MAX, Vec3::splat(1e-45)] {
         assert!(made.haar.eval(d).is_finite(), "{d}");
     }
 }
@@ -455,98 +313,51 @@ fn values_that_are_not_finite_become_zero() {
 #[test]
 fn huge_functions_stop_at_the_limit() {
     // Never smooth enough, at any level.
-    let made = Haar::project(&settings(6, MAX_LEVEL, 0.0), &Known::NOTHING, |d| {
-        d * 1e5 % 1.0
-    });
+    let made = Haar::project(&settings(6, MAX_LEVEL, 0.0), &Known::NOTHING, |d| d * 1e5 % 1.0);
     assert!(made.truncated, "the limit is reported");
-    assert!(
-        made.haar.vertices.len() <= mesh::MAX_VERTICES,
-        "{}",
-        made.haar.vertices.len()
-    );
-    assert!(
-        made.haar.nodes.len() < 1 << 15,
-        "{} nodes",
-        made.haar.nodes.len()
-    );
+    assert!(made.haar.vertices.len() <= mesh::MAX_VERTICES, "{}", made.haar.vertices.len());
+    assert!(made.haar.nodes.len() < 1 << 15, "{} nodes", made.haar.nodes.len());
     assert_balanced(&made.haar);
     let twice = made.haar.add(&made.haar);
-    assert!(
-        (twice.eval(Vec3::Z) - 2.0 * made.haar.eval(Vec3::Z))
-            .abs()
-            .max_element()
-            < 1e-3,
-        "sum of full ones"
-    );
+    assert!((twice.eval(Vec3::Z) - 2.0 * made.haar.eval(Vec3::Z)).abs().max_element() < 1e-3, "sum of full ones");
 }
 
 #[test]
 fn empty_costs_nothing() {
     let empty = project(&settings(2, 5, 0.3), |_| Rgb::ZERO);
-    assert!(
-        empty.is_empty() && empty.basis_functions() == 0,
-        "{empty:?}"
-    );
+    assert!(empty.is_empty() && empty.basis_functions() == 0, "{empty:?}");
     assert_eq!(empty.bytes(), size_of::<Haar>(), "nothing on the heap");
     assert!(size_of::<Haar>() <= 40, "{}", size_of::<Haar>());
     assert_eq!(empty.eval(Vec3::Z), Rgb::ZERO, "zero");
     assert_eq!(empty.bounds(&Cone::SPHERE), (Rgb::ZERO, Rgb::ZERO), "zero");
     assert_eq!(empty.integral(), Rgb::ZERO, "zero");
-    assert!(
-        Haar::average(
-            &[(1.0, &empty), (2.0, &empty)],
-            &settings(1, 5, 0.3),
-            Rgb::ZERO
-        )
-        .is_empty(),
-        "average"
-    );
+    assert!(Haar::average(&[(1.0, &empty), (2.0, &empty)], &settings(1, 5, 0.3), Rgb::ZERO).is_empty(), "average");
 }
 
 #[test]
 fn eight_bytes_per_basis_function() {
     for exponent in [10.0_f32, 50.0, 200.0, 1000.0] {
         let axis = Vec3::new(0.2, 0.3, 0.9).normalize();
-        let peaks = [Peak {
-            direction: axis,
-            width: 1.0 / exponent.sqrt(),
-        }];
-        let known = Known {
-            peaks: &peaks,
-            ..Known::NOTHING
-        };
+        let peaks = [Peak { direction: axis, width: 1.0 / exponent.sqrt() }];
+        let known = Known { peaks: &peaks, ..Known::NOTHING };
         let haar = Haar::project(&settings(1, 7, 0.2), &known, lobe(axis, exponent)).haar;
         let per = (haar.bytes() - size_of::<Haar>()) as f32 / haar.basis_functions() as f32;
-        assert!(
-            per <= 8.0,
-            "cos^{exponent}: {per} bytes per basis function ({})",
-            haar.basis_functions()
-        );
+        assert!(per <= 8.0, "cos^{exponent}: {per} bytes per basis function ({})", haar.basis_functions());
     }
 }
 
 #[test]
 fn map_multiplies_and_scale_scales() {
     let axis = Vec3::new(0.2, 0.3, 0.9).normalize();
-    let haar = project(&settings(3, 5, 0.3), |d| {
-        lobe(axis, 8.0)(d) + Rgb::new(0.1, 0.2, 0.3)
-    });
+    let haar = project(&settings(3, 5, 0.3), |d| lobe(axis, 8.0)(d) + Rgb::new(0.1, 0.2, 0.3));
     let clipped = haar.map(|d, v| v * d.dot(axis).max(0.0));
     let mut scaled = haar.clone();
     scaled.scale(-2.5e10);
     for d in directions(1000) {
         let (v, cos) = (haar.eval(d), d.dot(axis).max(0.0));
         // Triangles are at most 11° wide: the product is off by the product of two differences.
-        assert!(
-            (clipped.eval(d) - v * cos).abs().max_element() < 0.04,
-            "{d}: {} {}",
-            clipped.eval(d),
-            v * cos
-        );
-        assert!(
-            (scaled.eval(d) + v * 2.5e10).abs().max_element() < 1e-3 * 2.5e10,
-            "{d}"
-        );
+        assert!((clipped.eval(d) - v * cos).abs().max_element() < 0.04, "{d}: {} {}", clipped.eval(d), v * cos);
+        assert!((scaled.eval(d) + v * 2.5e10).abs().max_element() < 1e-3 * 2.5e10, "{d}");
     }
     scaled.scale(f32::NAN);
     assert!(scaled.is_empty(), "a factor that is not a number empties");
@@ -571,23 +382,9 @@ fn lobes() -> impl Strategy<Value = Vec<(Vec3, f32, f32)>> {
 }
 
 fn make(lobes: &[(Vec3, f32, f32)], settings: &Refinement) -> Haar {
-    let peaks: Vec<Peak> = lobes
-        .iter()
-        .map(|l| Peak {
-            direction: l.0,
-            width: 0.5_f32.powf(l.1),
-        })
-        .collect();
-    let known = Known {
-        peaks: &peaks,
-        ..Known::NOTHING
-    };
-    let f = |d: Vec3| {
-        lobes
-            .iter()
-            .map(|l| lobe(l.0, 4.0_f32.powf(l.1))(d) * Rgb::new(l.2, l.2.abs(), 1.0))
-            .sum()
-    };
+    let peaks: Vec<Peak> = lobes.iter().map(|l| Peak { direction: l.0, width: 0.5_f32.powf(l.1) }).collect();
+    let known = Known { peaks: &peaks, ..Known::NOTHING };
+    let f = |d: Vec3| lobes.iter().map(|l| lobe(l.0, 4.0_f32.powf(l.1))(d) * Rgb::new(l.2, l.2.abs(), 1.0)).sum();
     Haar::project(settings, &known, f).haar
 }
 

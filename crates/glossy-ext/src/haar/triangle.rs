@@ -19,9 +19,7 @@ pub(super) const EDGE_ENDS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 /// Picks the corners of a child from corners and midpoints, whatever is kept there.
 #[inline]
 pub(super) fn child_corners<T: Copy>(corners: [T; 3], mids: [T; 3], child: usize) -> [T; 3] {
-    let all = [
-        corners[0], corners[1], corners[2], mids[0], mids[1], mids[2],
-    ];
+    let all = [corners[0], corners[1], corners[2], mids[0], mids[1], mids[2]];
     CHILD_CORNERS[child].map(|i| all[i])
 }
 
@@ -52,11 +50,7 @@ impl ConeTest {
 
     pub(super) fn new(cone: &Cone) -> Self {
         let cos = cone.cos_angle.clamp(-1.0, 1.0);
-        Self {
-            axis: cone.axis,
-            cos,
-            sin: (1.0 - cos * cos).max(0.0).sqrt(),
-        }
+        Self { axis: cone.axis, cos, sin: (1.0 - cos * cos).max(0.0).sqrt() }
     }
 }
 
@@ -83,10 +77,7 @@ pub(super) struct Triangle {
 impl Triangle {
     #[inline]
     pub(super) fn new(corners: [Vec3; 3]) -> Self {
-        Self {
-            corners,
-            center: (corners[0] + corners[1] + corners[2]).normalize(),
-        }
+        Self { corners, center: (corners[0] + corners[1] + corners[2]).normalize() }
     }
 
     #[inline]
@@ -103,10 +94,7 @@ impl Triangle {
     #[inline]
     pub(super) fn cos_radius(&self) -> f32 {
         let cos = |c: Vec3| self.center.dot(c) / c.length();
-        cos(self.corners[0])
-            .min(cos(self.corners[1]))
-            .min(cos(self.corners[2]))
-            .min(1.0)
+        cos(self.corners[0]).min(cos(self.corners[1])).min(cos(self.corners[2])).min(1.0)
     }
 
     /// Whether a cone and this triangle may have a direction in common. Never wrongly false.
@@ -120,9 +108,7 @@ impl Triangle {
         let cos = self.cos_radius();
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
         // Inside: angle(axis, center) ≤ cone's angle − radius, in cosines.
-        if cone.cos < cos - ConeTest::SLACK
-            && between > cone.cos * cos + cone.sin * sin + ConeTest::SLACK
-        {
+        if cone.cos < cos - ConeTest::SLACK && between > cone.cos * cos + cone.sin * sin + ConeTest::SLACK {
             return Overlap::Inside;
         }
         // Touching the circle around the triangle: angle(axis, center) ≤ cone's angle + radius.
@@ -138,35 +124,20 @@ impl Triangle {
         }
         let reaches = |&[a, b]: &[usize; 2]| {
             let normal = self.corners[a].cross(self.corners[b]);
-            let inward = if normal.dot(self.center) < 0.0 {
-                -normal
-            } else {
-                normal
-            };
+            let inward = if normal.dot(self.center) < 0.0 { -normal } else { normal };
             inward.dot(cone.axis) >= -cone.sin * normal.length() - ConeTest::SLACK
         };
-        if EDGE_ENDS.iter().all(reaches) {
-            Overlap::Partial
-        } else {
-            Overlap::Apart
-        }
+        if EDGE_ENDS.iter().all(reaches) { Overlap::Partial } else { Overlap::Apart }
     }
 
     /// ∫ weight(direction) · (linear interpolation of `values`) dω over the triangle and ∫ weight dω, by quadrature
     /// on each of 4^`splits` parts: Radon's seven points, fewer for small triangles. The solid angle of an area dA
     /// of a face, at distance 1/√3 from the origin, is dω = dA / (√3 |p|³).
-    pub(super) fn integrate(
-        &self,
-        values: [DVec3; 3],
-        splits: u32,
-        weight: &impl Fn(Vec3) -> f32,
-    ) -> (DVec3, f64) {
+    pub(super) fn integrate(&self, values: [DVec3; 3], splits: u32, weight: &impl Fn(Vec3) -> f32) -> (DVec3, f64) {
         if splits > 0 {
             let mids = EDGE_ENDS.map(|[a, b]| 0.5 * (values[a] + values[b]));
             return (0..4).fold((DVec3::ZERO, 0.0), |(sum, total), i| {
-                let (s, t) =
-                    self.child(i)
-                        .integrate(child_corners(values, mids, i), splits - 1, weight);
+                let (s, t) = self.child(i).integrate(child_corners(values, mids, i), splits - 1, weight);
                 (sum + s, total + t)
             });
         }
@@ -174,11 +145,7 @@ impl Triangle {
         let area = 0.5 * f64::from((b - a).cross(c - a).length());
         let (mut sum, mut total) = (DVec3::ZERO, 0.0);
         // Small triangles take the three midpoints of their edges, degree 2.
-        let rule: &[_] = if self.cos_radius() > 0.998 {
-            &MIDPOINTS
-        } else {
-            &RADON
-        };
+        let rule: &[_] = if self.cos_radius() > 0.998 { &MIDPOINTS } else { &RADON };
         for &(l, w) in rule {
             let p = a * l[0] as f32 + b * l[1] as f32 + c * l[2] as f32;
             let length = p.length();
@@ -199,11 +166,8 @@ impl Triangle {
 }
 
 /// The rule of degree 2 on a triangle: barycentric coordinates and weights.
-const MIDPOINTS: [([f64; 3], f64); 3] = [
-    ([0.0, 0.5, 0.5], 1.0 / 3.0),
-    ([0.5, 0.0, 0.5], 1.0 / 3.0),
-    ([0.5, 0.5, 0.0], 1.0 / 3.0),
-];
+const MIDPOINTS: [([f64; 3], f64); 3] =
+    [([0.0, 0.5, 0.5], 1.0 / 3.0), ([0.5, 0.0, 0.5], 1.0 / 3.0), ([0.5, 0.5, 0.0], 1.0 / 3.0)];
 
 /// Radon's rule of degree 5 on a triangle: barycentric coordinates and weights.
 const RADON: [([f64; 3], f64); 7] = {

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3, vec2};
 use smallvec::{SmallVec, smallvec};
 
 /// Gauss–Legendre points of order 2 on 0…1.
-const GAUSS: [f32; 2] = [0.211_324_87, 0.788_675_13];
+const GAUSS: [f32; 2] = [0.211_324_87, 0.788_675_1];
 
 impl Geometry {
     /// Whether it is bounded by straight edges.

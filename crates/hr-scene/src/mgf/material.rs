@@ -1,8 +1,8 @@
 //! Materials: what a file says of them, and what becomes of it.
 
-use crate::reflectors::ward;
 use super::color::Chromaticity;
 use crate::Material;
+use crate::reflectors::ward;
 use crate::warnings::Warnings;
 use glam::DVec3;
 use glossy_ext::Rgb;

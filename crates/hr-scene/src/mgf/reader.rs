@@ -176,7 +176,7 @@ impl Reader<'_> {
             "cxy" | "cspec" | "cct" | "cmix" => self.color(keyword, words)?,
             "rd" | "rs" | "td" | "ts" | "ed" | "sides" | "ir" => self.property(keyword, words)?,
             "f" | "fh" | "sph" | "cyl" | "cone" | "ring" | "torus" | "prism" => {
-                self.geometry(file, statement, words)?
+                self.geometry(file, statement, words)?;
             }
             "o" => self.object(words),
             "xf" => self.transform(file, statement, words)?,
