@@ -19,6 +19,12 @@ pub enum Command {
     Reference(ReferenceArgs),
     /// Distance of an image to a reference
     Compare(CompareArgs),
+    /// Solve scenes at several errors and compare their pictures with references: a Markdown table
+    Accuracy(AccuracyArgs),
+    /// Form factors against closed forms and brute force: a Markdown table
+    FormFactors(FormFactorArgs),
+    /// Rays per second on one thread: a Markdown table
+    Visibility(VisibilityArgs),
 }
 
 /// Of `hr-bench reference`.
@@ -73,4 +79,84 @@ pub struct CompareArgs {
     /// Exit with status 1 where block L1 is larger (0.05 is 5 %)
     #[arg(long, value_name = "E")]
     pub max_block: Option<f64>,
+}
+
+/// Of `hr-bench accuracy`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct AccuracyArgs {
+    /// Scene files or names of built-in scenes; where none is given all built-in ones, or with --reference those listed
+    #[arg(value_name = "SCENE")]
+    pub scenes: Vec<String>,
+
+    /// Errors to ask for
+    #[arg(long, value_name = "E", value_delimiter = ',', default_values_t = [0.2, 0.1, 0.05, 0.02])]
+    pub error: Vec<f32>,
+
+    /// Folder of references (references.json, views/NAME.npy); where it is not given, references are path traced
+    #[arg(long, value_name = "DIR")]
+    pub reference: Option<PathBuf>,
+
+    /// Paths per pixel of path traced references
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: u32,
+
+    /// Width in pixels of path traced references
+    #[arg(long, value_name = "W", default_value_t = 200, value_parser = clap::value_parser!(u32).range(8..=16384))]
+    pub width: u32,
+
+    /// Where path traced references are kept, to be used again
+    #[arg(long, value_name = "DIR", default_value = "target/hr-bench")]
+    pub out: PathBuf,
+}
+
+/// Of `hr-bench form-factors`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct FormFactorArgs {
+    /// Samples of brute force
+    #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = clap::value_parser!(u32).range(1..))]
+    pub samples: u32,
+}
+
+/// Of `hr-bench visibility`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct VisibilityArgs {
+    /// A scene file or the name of a built-in scene
+    #[arg(value_name = "SCENE", default_value = hr_scene::builtin::DEFAULT)]
+    pub scene: String,
+
+    /// Rays of each kind
+    #[arg(long, value_name = "N", default_value_t = 1 << 19, value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
+    pub rays: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn read(line: &str) -> Result<Command, String> {
+        let words = std::iter::once("hr-bench").chain(line.split_whitespace());
+        Cli::try_parse_from(words).map(|cli| cli.command).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_definition_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn everything_has_its_place() {
+        let Ok(Command::Accuracy(all)) = read("accuracy --error 0.3,0.1 cornell room --spp 9") else {
+            panic!("errors and scenes")
+        };
+        assert_eq!((all.error, all.spp), (vec![0.3, 0.1], 9), "errors");
+        assert_eq!(all.scenes, ["cornell", "room"], "scenes");
+        let Ok(Command::Accuracy(none)) = read("accuracy") else { panic!("nothing given") };
+        assert_eq!(none.error, [0.2, 0.1, 0.05, 0.02], "default errors");
+        let Ok(Command::Compare(two)) = read("compare a.pfm b.npy --below 3") else { panic!("two images") };
+        assert_eq!((two.below, two.max_block), (Some(3.0), None), "bounds");
+        for wrong in ["", "compare a.pfm", "reference", "reference --image a.pfm --spp 0", "accuracy --error x"] {
+            assert!(read(wrong).is_err(), "'{wrong}' was taken");
+        }
+    }
 }

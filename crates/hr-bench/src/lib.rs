@@ -1,12 +1,16 @@
 //! What the library is measured by: a reference path tracer, distances between images, and reports of accuracy and
 //! speed. Not published; the `hr-bench` command is its face.
 
+pub mod accuracy;
 pub mod args;
 pub mod compare;
 pub mod error;
 pub mod float_image;
+pub mod form_factors;
 pub mod path_tracer;
 pub mod run;
+pub mod views;
+pub mod visibility;
 
 pub use error::BenchError;
 pub use path_tracer::{PathTracer, Reference};

@@ -358,7 +358,7 @@ impl Point {
 
 /// Weight of a sample of density `own` where `other` is that of another way to draw it (exponent 2). The weights of
 /// both add up to 1; an infinite density takes all.
-fn power_heuristic(own: f32, other: f32) -> f32 {
+pub(crate) fn power_heuristic(own: f32, other: f32) -> f32 {
     if own.is_infinite() {
         return 1.0;
     }
@@ -367,7 +367,7 @@ fn power_heuristic(own: f32, other: f32) -> f32 {
 }
 
 /// A direction of density cos/π (Malley's method).
-fn cosine_hemisphere(u: Vec2) -> Vec3 {
+pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3 {
     let (sin, cos) = (2.0 * PI * u.x).sin_cos();
     let radius = u.y.sqrt();
     Vec3::new(radius * cos, radius * sin, (1.0 - u.y).sqrt())

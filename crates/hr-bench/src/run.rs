@@ -1,9 +1,10 @@
 //! What the subcommands do.
 
-use crate::args::{Cli, Command, CompareArgs, ReferenceArgs};
+use crate::args::{AccuracyArgs, Cli, Command, CompareArgs, ReferenceArgs, VisibilityArgs};
 use crate::compare::{compare, luminance};
-use crate::{BenchError, PathTracer, float_image};
-use hr_scene::{Camera, ImageKind, Scene, ToneMap};
+use crate::views::{Making, listed, path_traced};
+use crate::{BenchError, PathTracer, accuracy, float_image, form_factors, visibility};
+use hr_scene::{Camera, ImageKind, Scene, ToneMap, builtin};
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
@@ -20,6 +21,9 @@ pub fn run(cli: &Cli, out: Out<'_>) -> Result<(), BenchError> {
     match &cli.command {
         Command::Reference(args) => reference(args, out),
         Command::Compare(args) => compare_files(args, out),
+        Command::Accuracy(args) => measure_accuracy(args, out),
+        Command::FormFactors(args) => form_factors::report(args.samples, out),
+        Command::Visibility(args) => measure_visibility(args, out),
     }
 }
 
@@ -80,4 +84,23 @@ fn compare_files(args: &CompareArgs, out: Out<'_>) -> Result<(), BenchError> {
         }
         _ => Ok(()),
     }
+}
+
+fn measure_accuracy(args: &AccuracyArgs, out: Out<'_>) -> Result<(), BenchError> {
+    if let Some(folder) = &args.reference {
+        let wanted = |name: &str| args.scenes.is_empty() || args.scenes.iter().any(|scene| scene == name);
+        return accuracy::report(&listed(folder, wanted, out)?, &args.error, out);
+    }
+    let all = || builtin::NAMES.iter().map(|&name| name.to_owned()).collect();
+    let names: Vec<String> = if args.scenes.is_empty() { all() } else { args.scenes.clone() };
+    let making = Making { folder: &args.out, spp: args.spp, width: args.width };
+    let scenes = names.iter().map(|name| Scene::load(name).map(Arc::new)).collect::<Result<Vec<_>, _>>()?;
+    let subjects = scenes.into_iter().map(|scene| path_traced(scene, &making, out)).collect::<Result<Vec<_>, _>>()?;
+    accuracy::report(&subjects, &args.error, out)
+}
+
+fn measure_visibility(args: &VisibilityArgs, out: Out<'_>) -> Result<(), BenchError> {
+    let scene = Arc::new(Scene::load(&args.scene)?);
+    let camera = camera(&scene, None)?;
+    visibility::report(&PathTracer::new(scene)?, &camera, args.rays, out)
 }
