@@ -1,9 +1,9 @@
 //! The glossy light field: illumination samples in, directional distributions out, through the hooks alone.
 
+use crate::Rgb;
 use crate::haar::{Beyond, Haar, Known, Peak, Refinement, Support};
 use crate::reflector::{Incident, Reflector, Ward};
 use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_weak};
-use crate::Rgb;
 use glam::Vec3;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
 use std::sync::Arc;
@@ -79,7 +79,7 @@ impl GlossyField {
                 }
             })
         });
-        
+
         Self { materials: materials.collect(), refinement, counters: Counters::default() }
     }
 

@@ -4,6 +4,8 @@
 //! then the elements it asked to split are split in order, and the parts make the next wave. So the result does
 //! not depend on the number of threads.
 
+use crate::Rgb;
+use crate::geometry::Domain;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
 use crate::links::Link;
@@ -11,8 +13,6 @@ use crate::oracle::{FactorBounds, factor_bounds};
 use crate::segments;
 use crate::stats::Skipped;
 use crate::transport::{Exitant, Light};
-use crate::geometry::Domain;
-use crate::Rgb;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
@@ -167,11 +167,7 @@ impl<L: LightField> MutableLight<'_, L> {
     }
 }
 
-fn split_elements<L: LightField>(
-    light: &mut MutableLight<'_, L>,
-    wave: &[(Pair, Option<Link>)],
-    verdicts: &[Verdict],
-) {
+fn split_elements<L: LightField>(light: &mut MutableLight<'_, L>, wave: &[(Pair, Option<Link>)], verdicts: &[Verdict]) {
     for ((pair, _), verdict) in wave.iter().zip(verdicts) {
         let nodes: SmallVec<[u32; 2]> = match verdict {
             Verdict::SplitReceiver => smallvec![pair.receiver],
@@ -191,7 +187,8 @@ fn split_elements<L: LightField>(
                 } else {
                     Vec3::ZERO
                 };
-                let own = emitted + exitant.irradiance[parent] * (element.reflectance + light.faint[element.material as usize]);
+                let own = emitted
+                    + exitant.irradiance[parent] * (element.reflectance + light.faint[element.material as usize]);
                 exitant.radiosity.push(own);
                 exitant.range.push([own, own]);
                 exitant.direction.push(element.mean_normal);
@@ -277,12 +274,8 @@ fn decide<L: LightField>(
     if let Some(link) = old {
         return Verdict::Keep(link);
     }
-    let mut link = Link {
-        receiver: pair.receiver,
-        sender: pair.sender,
-        factor: mean_factor(light, pair),
-        visibility: 0.0,
-    };
+    let mut link =
+        Link { receiver: pair.receiver, sender: pair.sender, factor: mean_factor(light, pair), visibility: 0.0 };
     if link.factor <= 0.0 && bounds.max > 0.0 && !stopped {
         // The sampled points did not face each other, though some may: no light worth splitting for.
         link.visibility = 1.0;
@@ -299,8 +292,7 @@ fn decide<L: LightField>(
     if !(partial && stake > tolerance.error && !stopped) {
         let more = worth.clamp(FIRST_SEGMENTS, MOST_SEGMENTS);
         if more > FIRST_SEGMENTS {
-            let (a, b, c) =
-                segments::visibility(light, pair.receiver, pair.sender, FIRST_SEGMENTS..more, &mut blocker);
+            let (a, b, c) = segments::visibility(light, pair.receiver, pair.sender, FIRST_SEGMENTS..more, &mut blocker);
             seen += a;
             total += b;
             rays += c;
@@ -310,10 +302,11 @@ fn decide<L: LightField>(
     counters.nanoseconds.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
     link.visibility = if total > 0.0 { (seen / total).min(1.0) } else { 0.0 };
     let partial = seen > 0.0 && seen < total;
-    if partial && stake > tolerance.error {
-        if let Some(verdict) = split(choose(light, pair, tolerance, false)) {
-            return verdict;
-        }
+    if partial
+        && stake > tolerance.error
+        && let Some(verdict) = split(choose(light, pair, tolerance, false))
+    {
+        return verdict;
     }
     Verdict::Keep(link)
 }
@@ -335,7 +328,12 @@ fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Toleranc
 }
 
 /// Which of the two to split: the larger one, or the sender where its radiosity is what is uncertain.
-fn choose<L: LightField>(light: Light<'_, L>, pair: Pair, tolerance: Tolerance, prefer_sender: bool) -> Option<Verdict> {
+fn choose<L: LightField>(
+    light: Light<'_, L>,
+    pair: Pair,
+    tolerance: Tolerance,
+    prefer_sender: bool,
+) -> Option<Verdict> {
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
     let can_split = |e: &crate::hierarchy::Element| {
         e.kind == Kind::Cluster || e.is_patch() && (e.child_count > 0 || e.radius > tolerance.smallest)

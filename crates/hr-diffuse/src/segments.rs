@@ -3,8 +3,8 @@
 use crate::LightKind;
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::LightField;
-use crate::transport::Light;
 use crate::sampling::{hash, point2, point4, unit};
+use crate::transport::Light;
 use glam::{Vec2, Vec3};
 
 /// A point on a surface below a node.

@@ -304,12 +304,8 @@ impl<L: LightField> Solver<L> {
         own.resize(count, Rgb::ZERO);
         transfers.resize_with(count, Vec::new);
         let (light, links, field) = (self.light(), &self.links, &self.field);
-        own.par_iter_mut()
-            .zip(&mut transfers)
-            .zip(&mut incident)
-            .enumerate()
-            .with_min_len(64)
-            .for_each(|(node, ((own, transfers), incident))| {
+        own.par_iter_mut().zip(&mut transfers).zip(&mut incident).enumerate().with_min_len(64).for_each(
+            |(node, ((own, transfers), incident))| {
                 *own = Rgb::ZERO;
                 transfers.clear();
                 let element = light.element(node as u32);
@@ -324,8 +320,7 @@ impl<L: LightField> Solver<L> {
                     if irradiance.max_element() <= 0.0 {
                         continue;
                     }
-                    let transfer =
-                        Transfer { sender: NodeId(link.sender), direction, irradiance, oriented: flat };
+                    let transfer = Transfer { sender: NodeId(link.sender), direction, irradiance, oriented: flat };
                     if flat {
                         *own += irradiance;
                     } else {
@@ -335,7 +330,8 @@ impl<L: LightField> Solver<L> {
                         field.receive(incident, &transfer);
                     }
                 }
-            });
+            },
+        );
         (self.own, self.transfers, self.incident) = (own, transfers, incident);
     }
 

@@ -3,8 +3,8 @@
 //! Every pixel sends a few rays; where one meets a surface, the diffuse light comes from the irradiance at the
 //! vertices, and the glossy part from one of two sources ([`Mode`]).
 
-use glam::{DVec3, Vec2, Vec3};
 use crate::glossy;
+use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::{GlossyField, Incident, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2, unit};
