@@ -47,7 +47,7 @@ fn pfm(mut bytes: &[u8]) -> Result<Image, Fault> {
     let little = scale < 0.0;
     let values =
         bytes.as_chunks::<4>().0.iter().map(|&b| if little { f32::from_le_bytes(b) } else { f32::from_be_bytes(b) });
-    let mut image = image([height as usize, width as usize], values.collect())?;
+    let mut image = image([height as usize, width as usize], &values.collect::<Vec<_>>())?;
     let rows: Vec<Rgb> = image.pixels.rchunks_exact(image.width as usize).flatten().copied().collect();
     image.pixels = rows;
     Ok(image)
@@ -72,7 +72,7 @@ fn npy(bytes: &[u8]) -> Result<Image, Fault> {
     let shape = after("'shape'").and_then(|v| v.strip_prefix('(')?.split_once(')')).ok_or_else(broken)?.0;
     let sides: Vec<usize> = shape.split(',').filter_map(|n| n.trim().parse().ok()).collect();
     let [height, width, 3] = sides[..] else { return Err((format!("its shape is ({shape})"), mend)) };
-    let values = match after("'descr'") {
+    let values: Vec<f32> = match after("'descr'") {
         Some(kind) if kind.starts_with("'<f4'") => {
             data.as_chunks::<4>().0.iter().map(|&b| f32::from_le_bytes(b)).collect()
         }
@@ -81,10 +81,10 @@ fn npy(bytes: &[u8]) -> Result<Image, Fault> {
         }
         _ => return Err(("its numbers are of another type".into(), mend)),
     };
-    image([height, width], values)
+    image([height, width], &values)
 }
 
-fn image([height, width]: [usize; 2], values: Vec<f32>) -> Result<Image, Fault> {
+fn image([height, width]: [usize; 2], values: &[f32]) -> Result<Image, Fault> {
     if !(1..MOST_SIDE).contains(&width) || !(1..MOST_SIDE).contains(&height) || values.len() != width * height * 3 {
         let what = format!("it has {} numbers for {width} x {height} pixels", values.len());
         return Err((what, "an image has three numbers per pixel"));
