@@ -134,15 +134,15 @@ impl Case {
 
     /// Monte Carlo integration with `samples` points of the receiver: of each a point of the sender and a ray are drawn.
     /// The first alone has infinite variance where surfaces touch, the second is poor for small senders; the power
-    /// heuristic takes the better one of both.
+    /// heuristic takes the better one of both. Returns the form factor and its standard error.
     ///
     /// # Errors
     /// [`BenchError::Surface`] where a shape makes no sense.
-    pub fn brute_force(&self, samples: u32) -> Result<f64, BenchError> {
+    pub fn brute_force(&self, samples: u32) -> Result<(f64, f64), BenchError> {
         let [receiver, sender] = self.geometries()?;
         let area = sender.area(Domain::WHOLE);
         let total = receiver.area(Domain::WHOLE);
-        let mut sum = 0.0;
+        let (mut sum, mut squares) = (0.0, 0.0);
         for i in 0..samples {
             let sampler = Sampler::new(1, i);
             let (u, v) = (sampler.pair(0), sampler.pair(1));
@@ -163,9 +163,13 @@ impl Case {
                     found += power_heuristic(local.z * FRAC_1_PI, t * t / (area * cos_y));
                 }
             }
-            sum += f64::from(weight / total * found);
+            let found = f64::from(weight / total * found);
+            sum += found;
+            squares += found * found;
         }
-        Ok(sum / f64::from(samples))
+        let mean = sum / f64::from(samples);
+        let variance = (squares / f64::from(samples) - mean * mean).max(0.0);
+        Ok((mean, (variance / f64::from(samples)).sqrt()))
     }
 }
 
@@ -177,13 +181,14 @@ pub fn report(samples: u32, out: Out<'_>) -> Result<(), BenchError> {
     say(out, "| configuration | closed form | engine | error | brute force | error |")?;
     say(out, "| --- | ---: | ---: | ---: | ---: | ---: |")?;
     for case in cases() {
-        let (ours, brute) = (case.engine()?, case.brute_force(samples)?);
+        let (ours, (brute, sigma)) = (case.engine()?, case.brute_force(samples)?);
         let error = |v: f64| 100.0 * (v / case.exact - 1.0);
         let (name, exact) = (&case.name, case.exact);
         let line = format!(
-            "| {name} | {exact:.6} | {ours:.6} | {:+.3} % | {brute:.6} | {:+.3} % |",
+            "| {name} | {exact:.6} | {ours:.6} | {:+.3} % | {brute:.6} | {:+.3} ± {:.3} % |",
             error(ours),
-            error(brute)
+            error(brute),
+            100.0 * sigma / exact
         );
         say(out, &line)?;
     }
@@ -229,9 +234,10 @@ mod tests {
     #[test]
     fn brute_force_agrees_with_closed_forms() {
         for case in cases() {
-            let brute = case.brute_force(1 << 16).expect("sound shapes");
-            // 65536 stratified samples of a bounded integrand: well below 1/√65536 = 0.4 % of its spread.
-            assert!((brute / case.exact - 1.0).abs() < 4e-3, "{}: {brute}, exactly {}", case.name, case.exact);
+            let (brute, sigma) = case.brute_force(1 << 16).expect("sound shapes");
+            let (name, exact) = (&case.name, case.exact);
+            assert!(sigma < 0.01 * exact, "{name}: noise {sigma} of {exact}");
+            assert!((brute - exact).abs() < 4.0 * sigma, "{name}: {brute} ± {sigma}, exactly {exact}");
         }
     }
 }
