@@ -555,6 +555,9 @@ impl<L: LightField> Solver<L> {
             for child in range {
                 let part = &self.elements.nodes[child];
                 if part.kind == Kind::Light {
+                    // Whoever links to this cluster must open it to find the light.
+                    high = high.max(self.scene.lights[part.source as usize].intensity);
+                    low = Rgb::ZERO;
                     continue;
                 }
                 radiosity += exitant.radiosity[child] * part.area;
