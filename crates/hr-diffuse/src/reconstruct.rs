@@ -168,10 +168,13 @@ fn lay_out(scene: &SceneData, elements: &Elements) -> Vertices {
             if let Some(&vertex) = index.get(&key(position, normal, element.material)) {
                 outline.push(Corner { vertex, uv: a });
             }
-            let find = |uv: Vec2| {
+            let at = |uv: Vec2| {
                 let (position, normal) = point_on(scene, elements, leaf, uv);
                 index.get(&key(position, normal, element.material)).copied()
             };
+            // An edge that is one point, such as a pole, has no inner vertices.
+            let ends = [at(a), at(b)];
+            let find = |uv: Vec2| at(uv).filter(|vertex| !ends.contains(&Some(*vertex)));
             along_edge(a, b, EDGE_DEPTH, &find, &mut outline);
         }
         let uv = geometry.middle(element.domain);
