@@ -183,7 +183,7 @@ impl<L: LightField> Solver<L> {
                 let residual = self.iterate(pass >= FIRST_REFLECTED);
                 let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
                 stopped |= watch(&self.progress(Phase::Transport, fraction, *looseness)).is_break();
-                if self.remaining(residual) < goal {
+                if self.remaining(residual) < goal || stopped && iteration > 0 {
                     break;
                 }
             }
