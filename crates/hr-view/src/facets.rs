@@ -7,16 +7,16 @@ use glam::{DVec3, Mat3, Vec2, Vec3};
 use glossy_ext::GlossyField;
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::reconstruct::Corner;
-use hr_diffuse::{Domain, Geometry, Rgb, Solution};
+use hr_diffuse::{Domain, Geometry, Rgb, Shape, Solution, Surface};
 use hr_scene::{Scene, Texture};
 use std::collections::HashMap;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-/// A chord of a curved surface spans at most this angle (radians, 5°) …
-const FINE: f32 = 0.087;
-/// … unless it leaves the surface by less than this (unit space: 0.1 mm in a room of 10 m) …
-const FLAT_ENOUGH: f32 = 1e-5;
+/// A chord of a curved surface spans at most this angle (radians, 8°) …
+const FINE: f32 = 0.14;
+/// … unless it leaves the surface by less than this (unit space: 0.5 mm in a room of 10 m) …
+const FLAT_ENOUGH: f32 = 5e-5;
 /// … and then at most this (radians, 20°).
 const COARSE: f32 = 0.35;
 /// Edges this near to their surface (unit space) are never cut: rounding bends very short ones at random.
@@ -142,7 +142,9 @@ impl<'a> Maker<'a> {
             geometry,
             back,
             counter_clockwise: runs_counter_clockwise(geometry) != back,
-            black_behind: is_round(geometry) && solution.elements.surface_nodes[surface as usize][1] == NONE,
+            black_behind: is_round(geometry)
+                && !is_closed(&self.scene.surfaces[surface as usize])
+                && solution.elements.surface_nodes[surface as usize][1] == NONE,
             glossy: element.active,
             tint: material.reflector.diffuse() * FRAC_1_PI,
             emission: if back { Rgb::ZERO } else { material.exitance * FRAC_1_PI },
@@ -154,8 +156,13 @@ impl<'a> Maker<'a> {
         let middle = self.point(&look, middle);
         // Of an edge that is one point, such as a pole, the ends are enough.
         let inner = |i: usize| {
+            let corner = &outline[i];
             let beside = [outline[(i + outline.len() - 1) % outline.len()], outline[(i + 1) % outline.len()]];
-            beside.iter().all(|corner| corner.vertex == outline[i].vertex)
+            beside.iter().all(|next| {
+                let between = geometry.point(0.5 * (corner.uv + next.uv));
+                next.vertex == corner.vertex
+                    && between.distance(solution.vertices.positions[corner.vertex as usize]) < NEGLIGIBLE
+            })
         };
         let outline: Vec<Point> =
             (0..outline.len()).filter(|&i| !inner(i)).map(|i| self.point(&look, &outline[i])).collect();
@@ -364,6 +371,11 @@ impl<'a> Maker<'a> {
 /// Whether edges of parts may be round; a disk's outline is, though it is flat.
 fn is_round(geometry: &Geometry) -> bool {
     matches!(geometry, Geometry::Revolution(_))
+}
+
+/// Whether a surface hides its own back, from everywhere but the inside of a solid.
+fn is_closed(surface: &Surface) -> bool {
+    !surface.flip && matches!(surface.shape, Shape::Sphere { .. } | Shape::Torus { .. })
 }
 
 /// Whether the front of a surface is where its (u, v) run counter-clockwise.

@@ -71,31 +71,46 @@ fn meshes_are_sound_and_face_outward() {
 fn curved_surfaces_are_round_and_closed() {
     let sphere = Shape::Sphere { center: DVec3::new(1e3, -5.0, 2.0), radius: 3.0 };
     let torus = Shape::Torus { center: DVec3::ZERO, axis: DVec3::Z, major: 2.0, minor: 0.7 };
-    for (shape, euler) in [(sphere, 2), (torus, 0)] {
-        let solved = solved(scene_of(vec![Surface::new(shape.clone(), 0)], false), 1.0);
+    // One that absorbs everything is not refined: a single leaf, whose corners are one point.
+    for (shape, euler, absorbs, flip) in [
+        (&sphere, 2, false, false),
+        (&sphere, 2, true, true),
+        (&torus, 0, false, false),
+        (&torus, 0, true, false),
+        (&torus, 0, true, true),
+    ] {
+        let mut scene = scene_of(vec![Surface { flip, ..Surface::new(shape.clone(), 0) }], false);
+        if absorbs {
+            scene.materials[0].reflector = Arc::new(glossy_ext::Lambert::new(Rgb::ZERO).expect("black"));
+        }
+        let solved = solved(scene, 1.0);
         let walkthrough = Walkthrough::new(&solved, Mode::Distributions);
         let mesh = walkthrough.mesh();
         assert_eq!(mesh.check(), Ok(()), "{shape:?}");
         let mut edges: HashMap<([u32; 3], [u32; 3]), u32> = HashMap::new();
         let (mut outside, mut inside) = (0, 0);
         for [a, b, c] in triangles(mesh) {
-            let black = mesh.tint[a as usize] == Rgb::ZERO;
-            if black {
+            if mesh.emission[a as usize] == Rgb::ZERO {
                 inside += 1;
-                assert_eq!(mesh.emission[a as usize], Rgb::ZERO, "the inside of {shape:?} does not shine");
+                assert_eq!(mesh.tint[a as usize], Rgb::ZERO, "the inside of {shape:?} is black");
                 continue;
             }
             outside += 1;
             for (from, to) in [(a, b), (b, c), (c, a)] {
                 *edges.entry((place(mesh, from), place(mesh, to))).or_default() += 1;
-                // 5° by the height of the arc; along a saddle, which is straight, the normal turns without any.
+                // 8° by the height of the arc; along a saddle, which is straight, the normal turns without any.
                 let cosine = mesh.normals[from as usize].dot(mesh.normals[to as usize]);
-                let most: f32 = if euler == 2 { 0.13 } else { 0.35 };
+                let most: f32 = if euler == 2 { 0.21 } else { 0.4 };
                 assert!(cosine > most.cos(), "{shape:?}: an edge spans {} rad", cosine.acos());
             }
         }
-        let folded = outside - inside;
-        assert!((0..outside / 50).contains(&folded), "{shape:?}: {outside} outside, {inside} inside");
+        // Only a flipped one shows its back; slivers that are folded over have none.
+        let missing = outside - inside;
+        assert!(
+            if flip { (0..outside / 50).contains(&missing) } else { inside == 0 },
+            "{shape:?}: {outside} outside, {inside} inside"
+        );
+        assert!(outside > 500, "{shape:?} is all there: {outside} triangles");
         let open = edges.iter().filter(|((a, b), count)| **count != 1 || edges.get(&(*b, *a)) != Some(&1)).count();
         assert_eq!(open, 0, "{shape:?}: {open} of {} edges are open", edges.len());
         let corners: std::collections::HashSet<_> = edges.keys().map(|(a, _)| *a).collect();
