@@ -6,18 +6,21 @@ use crate::display::{Batch, DisplayMesh};
 use glam::{DVec3, Mat3, Vec2, Vec3};
 use glossy_ext::GlossyField;
 use hr_diffuse::hierarchy::Kind;
-use hr_diffuse::{Domain, Geometry, Rgb, Solution};
+use hr_diffuse::reconstruct::Corner;
+use hr_diffuse::{Domain, Geometry, Rgb, Shape, Solution, Surface};
 use hr_scene::{Scene, Texture};
 use std::collections::HashMap;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-/// A chord of a curved surface spans at most this angle (radians, 5°) …
-const FINE: f32 = 0.087;
-/// … unless it leaves the surface by less than this (unit space: 0.1 mm in a room of 10 m) …
-const FLAT_ENOUGH: f32 = 1e-5;
+/// A chord of a curved surface spans at most this angle (radians, 8°) …
+const FINE: f32 = 0.14;
+/// … unless it leaves the surface by less than this (unit space: 0.5 mm in a room of 10 m) …
+const FLAT_ENOUGH: f32 = 5e-5;
 /// … and then at most this (radians, 20°).
 const COARSE: f32 = 0.35;
+/// Edges this near to their surface (unit space) are never cut: rounding bends very short ones at random.
+const NEGLIGIBLE: f32 = 1e-6;
 /// An edge is halved at most so often: a full turn to less than a degree and a half.
 const MOST_CUTS: u32 = 8;
 /// No index.
@@ -139,7 +142,9 @@ impl<'a> Maker<'a> {
             geometry,
             back,
             counter_clockwise: runs_counter_clockwise(geometry) != back,
-            black_behind: is_round(geometry) && solution.elements.surface_nodes[surface as usize][1] == NONE,
+            black_behind: is_round(geometry)
+                && !is_closed(&self.scene.surfaces[surface as usize])
+                && solution.elements.surface_nodes[surface as usize][1] == NONE,
             glossy: element.active,
             tint: material.reflector.diffuse() * FRAC_1_PI,
             emission: if back { Rgb::ZERO } else { material.exitance * FRAC_1_PI },
@@ -147,17 +152,29 @@ impl<'a> Maker<'a> {
             varies,
         };
         let fan = solution.vertices.fan(leaf);
-        let mut points = fan.iter().map(|corner| Point {
-            uv: corner.uv,
-            at: solution.vertices.positions[corner.vertex as usize],
-            index: self.vertex(&look, corner.vertex, corner.uv),
-        });
-        let Some(middle) = points.next() else { return };
-        let outline: Vec<Point> = points.collect();
+        let Some((middle, outline)) = fan.split_first() else { return };
+        let middle = self.point(&look, middle);
+        // Of an edge that is one point, such as a pole, the ends are enough.
+        let inner = |i: usize| {
+            let corner = &outline[i];
+            let beside = [outline[(i + outline.len() - 1) % outline.len()], outline[(i + 1) % outline.len()]];
+            beside.iter().all(|next| {
+                let between = geometry.point(0.5 * (corner.uv + next.uv));
+                next.vertex == corner.vertex
+                    && between.distance(solution.vertices.positions[corner.vertex as usize]) < NEGLIGIBLE
+            })
+        };
+        let outline: Vec<Point> =
+            (0..outline.len()).filter(|&i| !inner(i)).map(|i| self.point(&look, &outline[i])).collect();
         let cuts = if is_round(geometry) { MOST_CUTS } else { 0 };
         for (i, &a) in outline.iter().enumerate() {
             self.triangle(&look, [middle, a, outline[(i + 1) % outline.len()]], cuts);
         }
+    }
+
+    fn point(&mut self, look: &Look, corner: &Corner) -> Point {
+        let at = self.solution.vertices.positions[corner.vertex as usize];
+        Point { uv: corner.uv, at, index: self.vertex(look, corner.vertex, corner.uv) }
     }
 
     /// A triangle counter-clockwise in (u, v), whose edges may be halved so many times more.
@@ -206,7 +223,7 @@ impl<'a> Maker<'a> {
             if length > 0.0 { (off - chord * (off.dot(chord) / (length * length))).length() } else { off.length() };
         // An arc of a small angle t over a chord of length 1 is t/8 high.
         let angle = if length > 0.0 { 8.0 * distance / length } else { f32::INFINITY };
-        if distance <= f32::EPSILON || angle < if distance < FLAT_ENOUGH { COARSE } else { FINE } {
+        if distance < NEGLIGIBLE || angle < if distance < FLAT_ENOUGH { COARSE } else { FINE } {
             return None;
         }
         // Adding zero makes −0 the same as 0.
@@ -233,7 +250,10 @@ impl<'a> Maker<'a> {
         }
         let corners = if look.counter_clockwise { [a, b, c] } else { [a, c, b] };
         self.batches[look.batch].extend(corners);
-        if look.black_behind {
+        // A sliver beside a pole may be folded over, within the tolerance; its black behind would be in front.
+        let [p, q, r] = corners.map(|vertex| self.mesh.positions[vertex as usize]);
+        let faces = (q - p).cross(r - p).dot(self.mesh.normals[corners[0] as usize]) > 0.0;
+        if look.black_behind && faces {
             let [a, b, c] = corners.map(|vertex| self.black_behind(vertex));
             self.batches[0].extend([a, c, b]);
         }
@@ -351,6 +371,11 @@ impl<'a> Maker<'a> {
 /// Whether edges of parts may be round; a disk's outline is, though it is flat.
 fn is_round(geometry: &Geometry) -> bool {
     matches!(geometry, Geometry::Revolution(_))
+}
+
+/// Whether a surface hides its own back, from everywhere but the inside of a solid.
+fn is_closed(surface: &Surface) -> bool {
+    !surface.flip && matches!(surface.shape, Shape::Sphere { .. } | Shape::Torus { .. })
 }
 
 /// Whether the front of a surface is where its (u, v) run counter-clockwise.
