@@ -109,7 +109,7 @@ fn the_error_asked_for_has_a_range() {
     }
 }
 
-/// Sets one of the numbers of a scene's surfaces and materials; tells whether there is one of that index.
+/// Sets one of a scene's numbers; tells whether there is one of that index.
 fn set(input: &mut SceneInput, index: usize, value: f64) -> bool {
     let mut at = 0;
     let mut hit = false;
@@ -168,10 +168,23 @@ fn set(input: &mut SceneInput, index: usize, value: f64) -> bool {
         singles(&mut material.reflectance, &mut next);
         singles(&mut material.exitance, &mut next);
     }
+    for light in &mut input.lights {
+        double(&mut light.position, &mut next);
+        singles(&mut light.intensity, &mut next);
+        match &mut light.kind {
+            LightKind::Point => {}
+            LightKind::Spot { direction, cos_inner, cos_outer } => {
+                singles(direction, &mut next);
+                single(cos_inner, &mut next);
+                single(cos_outer, &mut next);
+            }
+            LightKind::Directional { direction } => singles(direction, &mut next),
+        }
+    }
     hit
 }
 
-/// Every single number of surfaces and materials, one after the other, made as bad as numbers get.
+/// Every single number of the scene, one after the other, made as bad as numbers get.
 #[test]
 fn hostile_numbers_give_an_error_or_a_finite_answer() {
     let mut solved = 0;
@@ -180,7 +193,7 @@ fn hostile_numbers_give_an_error_or_a_finite_answer() {
         for index in 0.. {
             let mut input = scene();
             if !set(&mut input, index, value) {
-                assert!(index > 80, "all numbers: {index}");
+                assert!(index > 100, "all numbers: {index}");
                 break;
             }
             let Ok(mut solver) = Solver::new(&input, Settings { error: 1.0 }, ()) else { continue };

@@ -38,7 +38,7 @@ pub enum SolveError {
         range: &'static str,
     },
     /// A light's numbers make no sense.
-    #[error("light {light}: {what}; it must be finite, and intensities not negative")]
+    #[error("light {light}: {what}; correct it or leave the light out")]
     Light {
         /// Index of the light.
         light: usize,

@@ -134,3 +134,27 @@ pub trait SurfaceReflectance: std::fmt::Debug + Send + Sync {
     /// material's own applies.
     fn mean(&self, surface: u32, corners: &[Vec2]) -> Option<Rgb>;
 }
+
+impl Light {
+    /// What is wrong with a light, if anything is.
+    pub(crate) fn fault(&self) -> Option<&'static str> {
+        if !self.position.is_finite() {
+            return Some("its position is not finite");
+        }
+        if !self.intensity.is_finite() || self.intensity.min_element() < 0.0 {
+            return Some("its intensity is negative or not finite");
+        }
+        match self.kind {
+            LightKind::Point => None,
+            LightKind::Spot { direction, .. } | LightKind::Directional { direction } if !direction.is_normalized() => {
+                Some("its direction is not a unit vector")
+            }
+            LightKind::Spot { cos_inner, cos_outer, .. } => {
+                let cosines = -1.0..=1.0;
+                let wrong = !cosines.contains(&cos_inner) || !cosines.contains(&cos_outer) || cos_inner < cos_outer;
+                wrong.then_some("the cosines of its cone are not within -1 to 1, or the inner cone is the wider one")
+            }
+            LightKind::Directional { .. } => None,
+        }
+    }
+}

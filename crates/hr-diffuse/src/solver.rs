@@ -678,11 +678,8 @@ fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
         }
     }
     for (light, l) in input.lights.iter().enumerate() {
-        if !l.position.is_finite() {
-            return Err(SolveError::Light { light, what: "its position is not finite" });
-        }
-        if !l.intensity.is_finite() || l.intensity.min_element() < 0.0 {
-            return Err(SolveError::Light { light, what: "its intensity is negative or not finite" });
+        if let Some(what) = l.fault() {
+            return Err(SolveError::Light { light, what });
         }
     }
     let normalization = Normalization::new(&input.surfaces);
@@ -695,6 +692,12 @@ fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
         })
         .collect::<Result<Vec<_>, _>>()?;
     let scale2 = (normalization.scale() * normalization.scale()) as f32;
+    for (light, l) in input.lights.iter().enumerate() {
+        // Far outside of the scene f32 ends: its square, which the inverse square law needs, must exist.
+        if normalization.to_unit(l.position).abs().max_element() > 1e15 {
+            return Err(SolveError::Light { light, what: "it is too far from the scene; make it a directional light" });
+        }
+    }
     let lights = input.lights.iter().map(|l| match l.kind {
         LightKind::Directional { .. } => *l,
         _ => crate::Light { intensity: l.intensity * scale2, ..*l },
