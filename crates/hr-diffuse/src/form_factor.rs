@@ -6,7 +6,7 @@
 //! kernel is bounded.
 
 use crate::geometry::{Domain, Geometry};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use smallvec::SmallVec;
 use std::f64::consts::PI;
 
@@ -15,6 +15,10 @@ use std::f64::consts::PI;
 const FAR: f32 = 0.06;
 /// The same for pieces of curved senders, which have no closed form and are split down to it.
 const CURVED_FAR: f32 = 0.25;
+/// Pieces that go further around than this share of the parameters are split, too: 45° around, 45° along a sphere.
+const CURVED_BENT: f32 = 0.25;
+/// Chords that stand for a full circle.
+const RING_CHORDS: f32 = 24.0;
 /// Splits of a curved sender end here: 4⁴ pieces.
 const CURVED_DEPTH: u32 = 4;
 
@@ -94,7 +98,7 @@ pub fn point_to_sphere(x: Vec3, n: Vec3, center: Vec3, radius: f32) -> f32 {
 }
 
 /// Point kernel cos θ cos θ' A / (π d²), bounded by cos θ: also where sender and receiver touch it stays below 1.
-fn kernel(x: Vec3, n: Vec3, point: Vec3, normal: Vec3, area: f32) -> f32 {
+pub(crate) fn kernel(x: Vec3, n: Vec3, point: Vec3, normal: Vec3, area: f32) -> f32 {
     let to = point - x;
     let d2 = to.length_squared();
     if d2 <= 0.0 {
@@ -142,23 +146,55 @@ pub fn point_to_surface(geometry: &Geometry, domain: &Domain, back: bool, x: Vec
             Some((center, radius)) if *domain == Domain::WHOLE && geometry.is_convex(back) => {
                 point_to_sphere(x, n, center, radius)
             }
+            _ if geometry.is_flat() => point_to_ring(geometry, *domain, back, x, n),
             _ => curved(geometry, *domain, back, x, n, CURVED_DEPTH),
         },
     }
 }
 
+/// A disk, a ring or a sector of one, as a polygon of as much area.
+fn point_to_ring(geometry: &Geometry, domain: Domain, back: bool, x: Vec3, n: Vec3) -> f32 {
+    let normal = geometry.normal(geometry.middle(domain)) * if back { -1.0 } else { 1.0 };
+    let center = geometry.point(geometry.middle(domain));
+    if (x - center).dot(normal) <= IN_PLANE {
+        return 0.0;
+    }
+    let turn = domain.u1 - domain.u0;
+    let chords = (turn * RING_CHORDS).ceil().max(2.0);
+    let mut corners: SmallVec<[Vec3; 64]> = SmallVec::new();
+    for (v, reversed) in [(domain.v1, false), (domain.v0, true)] {
+        for i in 0..=chords as u32 {
+            let step = i as f32 / chords;
+            let u = domain.u0 + turn * if reversed { 1.0 - step } else { step };
+            corners.push(geometry.point(Vec2::new(u, v)));
+        }
+    }
+    let newell: Vec3 =
+        (1..corners.len() - 1).map(|i| (corners[i] - corners[0]).cross(corners[i + 1] - corners[0])).sum();
+    if newell.dot(normal) < 0.0 {
+        corners.reverse();
+    }
+    // Chords cut off a little of each arc.
+    let lost = geometry.area(domain) / (0.5 * newell.length()).max(f32::MIN_POSITIVE);
+    (point_to_polygon(x, n, &corners) * lost.clamp(1.0, 1.1)).min(1.0)
+}
+
 fn curved(geometry: &Geometry, domain: Domain, back: bool, x: Vec3, n: Vec3, depth: u32) -> f32 {
-    let uv = geometry.middle(domain);
-    let point = geometry.point(uv);
+    let point = geometry.point(geometry.middle(domain));
     let area = geometry.area(domain);
     let radius2 = geometry
         .corners(domain)
         .iter()
         .map(|&corner| geometry.point(corner).distance_squared(point))
         .fold(area * 0.25, f32::max);
-    if depth == 0 || radius2 < CURVED_FAR * CURVED_FAR * point.distance_squared(x) && domain != Domain::WHOLE {
-        let normal = geometry.normal(uv) * if back { -1.0 } else { 1.0 };
-        return kernel(x, n, point, normal, area);
+    let bent = (domain.u1 - domain.u0).abs().max((domain.v1 - domain.v0).abs()) > CURVED_BENT;
+    if depth == 0 || radius2 < CURVED_FAR * CURVED_FAR * point.distance_squared(x) && !bent {
+        let side = if back { -1.0 } else { 1.0 };
+        let points = geometry.quadrature(domain);
+        return points
+            .iter()
+            .map(|&(uv, weight)| kernel(x, n, geometry.point(uv), geometry.normal(uv) * side, area * weight))
+            .sum();
     }
     geometry.split(domain).into_iter().map(|part| curved(geometry, part, back, x, n, depth - 1)).sum()
 }

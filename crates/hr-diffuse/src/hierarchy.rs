@@ -5,11 +5,12 @@
 //! the parts that refinement makes of it. A two-sided surface has two incident fields, so its front and its back
 //! are two elements. Lights without extent are leaves that only send.
 
-use crate::geometry::{Domain, Geometry};
+use crate::geometry::{Domain, FACETS, Facet, Geometry};
 use crate::hooks::{FLAT_COSINE, Hierarchy, NodeId};
 use crate::scene::{Light, LightKind};
+use crate::sealed::lit_sides;
 use crate::visibility::Visibility;
-use crate::{Cone, DiffuseMaterial, Rgb, SurfaceReflectance};
+use crate::{Cone, DiffuseMaterial, Facing, Rgb, SurfaceReflectance};
 use glam::{Vec2, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
@@ -46,8 +47,8 @@ pub struct Element {
     pub radius: f32,
     /// Directions of its normals.
     pub normals: Cone,
-    /// Area-weighted mean of its normals: length 1 for flat nodes, 0 for closed ones.
-    pub mean_normal: Vec3,
+    /// How its normals are distributed. Distant lights have the direction here in which their light travels.
+    pub facing: Facing,
     /// Surface area.
     pub area: f32,
     /// Parent id; its own id for the root.
@@ -69,6 +70,8 @@ pub struct Element {
     pub importance: f32,
     /// Whether an extension takes part here or below.
     pub active: bool,
+    /// Index into [`Elements::facets`] of parts of curved surfaces that are no whole spheres; else `u32::MAX`.
+    pub facets: u32,
     /// Whether it is a whole sphere seen from outside.
     pub whole_sphere: bool,
     /// Whether no two points of the node's side of its surface see each other.
@@ -94,20 +97,11 @@ impl Element {
         matches!(self.kind, Kind::Front | Kind::Back)
     }
 
-    /// Mean of max(0, n·ω) over the node's surface: exact for flat nodes, for closed convex ones (¼), and for
-    /// curved ones seen wholly from the front; in between an interpolation.
+    /// Mean of max(0, n·ω) over the node's surface: see [`Facing::mean_cosine`].
     #[must_use]
     pub fn mean_cosine(&self, direction: Vec3) -> f32 {
-        mean_cosine(self.mean_normal, direction)
+        self.facing.mean_cosine(direction)
     }
-}
-
-/// Mean of max(0, n·ω) over normals of which only the mean vector is known (length 0…1).
-#[must_use]
-pub(crate) fn mean_cosine(mean_normal: Vec3, direction: Vec3) -> f32 {
-    let x = mean_normal.dot(direction);
-    let spread = (1.0 - mean_normal.length_squared()).max(0.0);
-    0.5 * (x + (x * x + 0.25 * spread).sqrt())
 }
 
 /// The static part of a scene in unit space, shared by solver and display.
@@ -170,6 +164,10 @@ pub struct Elements {
     pub nodes: Vec<Element>,
     /// The element of each surface's front and back; `u32::MAX` where there is none.
     pub surface_nodes: Vec<[u32; 2]>,
+    /// Points that stand for parts of curved surfaces.
+    pub facets: Vec<[Facet; FACETS]>,
+    /// Sides of surfaces left out because no light can reach them.
+    pub sealed: u64,
 }
 
 struct Boxed(obvhs::aabb::Aabb);
@@ -184,14 +182,19 @@ impl Elements {
     /// reflects of a material beside the diffuse part; `None` where it takes no part.
     pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<Rgb>) -> Self {
         let mut roots: Vec<Element> = Vec::new();
-        for i in 0..scene.surfaces().len() {
+        let mut sealed = 0;
+        for (i, lit) in lit_sides(scene).into_iter().enumerate() {
             let material = &scene.materials[scene.surface_materials[i] as usize];
             let glossy = extra(scene.surface_materials[i]);
             let front = patch(scene, i as u32, Kind::Front, Domain::WHOLE, glossy);
-            roots.push(front);
-            if material.two_sided && front.importance > 0.0 {
+            let back = material.two_sided && front.importance > 0.0;
+            if lit[0] {
+                roots.push(front);
+            }
+            if back && lit[1] {
                 roots.push(patch(scene, i as u32, Kind::Back, Domain::WHOLE, glossy));
             }
+            sealed += u64::from(!lit[0]) + u64::from(back && !lit[1]);
         }
         // Fronts and backs in trees of their own: what a cluster faces is then known better.
         let (fronts, backs): (Vec<Element>, Vec<Element>) = roots.into_iter().partition(|e| e.kind == Kind::Front);
@@ -201,9 +204,30 @@ impl Elements {
         trees.extend(Tree::build(backs));
         trees.extend(lights.into_iter().map(Tree::Leaf));
         let root = if trees.len() == 1 { trees.remove(0) } else { Tree::Inner(trees) };
-        let mut elements = Self { nodes: Vec::new(), surface_nodes: vec![[u32::MAX; 2]; scene.surfaces().len()] };
+        let mut elements = Self {
+            nodes: Vec::new(),
+            surface_nodes: vec![[u32::MAX; 2]; scene.surfaces().len()],
+            facets: Vec::new(),
+            sealed,
+        };
         elements.flatten(root);
+        for node in 0..elements.nodes.len() {
+            elements.add_facets(scene, node);
+        }
         elements
+    }
+
+    /// Lays down the facets of a part of a curved surface.
+    fn add_facets(&mut self, scene: &SceneData, node: usize) {
+        let element = &mut self.nodes[node];
+        if !element.is_patch() || element.whole_sphere {
+            return;
+        }
+        let geometry = &scene.surfaces()[element.source as usize];
+        if !geometry.is_polygon() {
+            element.facets = self.facets.len() as u32;
+            self.facets.push(geometry.facets(element.domain));
+        }
     }
 
     /// Lays the tree out breadth first, and fills clusters bottom-up.
@@ -244,14 +268,14 @@ impl Elements {
             low = low.min(child.bounds[0]);
             high = high.max(child.bounds[1]);
             cluster.area += child.area;
-            cluster.mean_normal += child.mean_normal * child.area;
+            cluster.facing.add(&child.facing, child.area);
             cluster.reflectance += child.reflectance * child.area;
             cluster.importance = cluster.importance.max(child.importance);
             cluster.active |= child.active;
             normals = Some(normals.map_or(child.normals, |n| n.union(&child.normals)));
         }
         if cluster.area > 0.0 {
-            cluster.mean_normal /= cluster.area;
+            cluster.facing = cluster.facing.scaled(cluster.area.recip());
             cluster.reflectance /= cluster.area;
         }
         if let Some(normals) = normals {
@@ -279,6 +303,7 @@ impl Elements {
             child.active = parent.active;
             child.importance = if parent.active { parent.importance } else { child.reflectance.max_element() };
             self.nodes.push(child);
+            self.add_facets(scene, self.nodes.len() - 1);
         }
         let parent = &mut self.nodes[node as usize];
         parent.first_child = first;
@@ -315,7 +340,7 @@ const EMPTY: Element = Element {
     center: Vec3::ZERO,
     radius: 0.0,
     normals: Cone::SPHERE,
-    mean_normal: Vec3::ZERO,
+    facing: Facing::ZERO,
     area: 0.0,
     parent: 0,
     first_child: 0,
@@ -326,6 +351,7 @@ const EMPTY: Element = Element {
     reflectance: Rgb::ZERO,
     importance: 0.0,
     active: false,
+    facets: u32::MAX,
     whole_sphere: false,
     convex: false,
 };
@@ -353,7 +379,7 @@ fn patch(scene: &SceneData, surface: u32, kind: Kind, domain: Domain, glossy: Op
         center,
         radius,
         normals,
-        mean_normal: geometry.mean_normal(domain) * sign,
+        facing: if kind == Kind::Back { geometry.facing(domain).reversed() } else { geometry.facing(domain) },
         area: geometry.area(domain),
         source: surface,
         material: scene.surface_materials[surface as usize],
@@ -370,11 +396,11 @@ fn patch(scene: &SceneData, surface: u32, kind: Kind, domain: Domain, glossy: Op
 fn light(scene: &SceneData, index: u32) -> Element {
     let at = scene.light_positions[index as usize];
     // A light without extent has no normals; the direction in which distant light travels stands there.
-    let mean_normal = match scene.lights[index as usize].kind {
-        LightKind::Directional { direction } => direction,
-        _ => Vec3::ZERO,
+    let facing = match scene.lights[index as usize].kind {
+        LightKind::Directional { direction } => Facing::single(direction),
+        _ => Facing::ZERO,
     };
-    Element { kind: Kind::Light, bounds: [at; 2], center: at, source: index, mean_normal, ..EMPTY }
+    Element { kind: Kind::Light, bounds: [at; 2], center: at, source: index, facing, ..EMPTY }
 }
 
 /// A tree of elements before it is laid out.
@@ -469,7 +495,7 @@ impl Hierarchy for Elements {
     fn direction_to(&self, sender: NodeId, at: Vec3) -> (Vec3, f32) {
         let e = &self.nodes[sender.index()];
         if self.is_distant(sender) {
-            return (-e.mean_normal, 0.0);
+            return (-e.facing.mean, 0.0);
         }
         let to = e.center - at;
         let d2 = to.length_squared().max(1e-20);
@@ -480,6 +506,6 @@ impl Hierarchy for Elements {
     }
     fn is_distant(&self, sender: NodeId) -> bool {
         let e = &self.nodes[sender.index()];
-        e.kind == Kind::Light && e.mean_normal != Vec3::ZERO
+        e.kind == Kind::Light && e.facing != Facing::ZERO
     }
 }

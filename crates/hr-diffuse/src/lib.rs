@@ -6,18 +6,23 @@
 //! [`scene`] → [`hierarchy`] → ([`oracle`] → refinement → [`links`], with [`form_factor`] and [`visibility`]) →
 //! gather → push → [`hooks`]' reflect → pull ([`solver`]) → [`reconstruct`] → [`solution`].
 
+mod columns;
 pub mod cone;
 pub mod error;
+pub mod facing;
 pub mod form_factor;
 pub mod geometry;
 pub mod hierarchy;
 pub mod hooks;
 pub mod links;
 pub mod oracle;
+mod place;
 pub mod reconstruct;
 mod refine;
+mod rows;
 pub mod sampling;
 pub mod scene;
+mod sealed;
 mod segments;
 pub mod solution;
 pub mod solver;
@@ -27,6 +32,7 @@ pub mod visibility;
 
 pub use cone::Cone;
 pub use error::SolveError;
+pub use facing::Facing;
 pub use geometry::{Aabb, Domain, Geometry, GeometryError, Normalization};
 pub use hooks::{Arrived, Hierarchy, LightField, NodeId, Transfer};
 pub use scene::{DiffuseMaterial, Light, LightKind, SceneInput, Shape, Surface, SurfaceReflectance};

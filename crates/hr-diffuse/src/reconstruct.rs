@@ -9,6 +9,8 @@ use crate::Rgb;
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::links::Links;
+use crate::place::{Class, Gathered, Placed};
+use crate::rows::{Row, look_around};
 use crate::sampling::hash;
 use crate::segments::visibility_at;
 use crate::transport::Light;
@@ -266,16 +268,16 @@ fn gather_at<L: LightField>(
     let element = light.element(leaf);
     let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET));
-    let mut arriving: SmallVec<[(Rgb, f32, u32); 128]> = SmallVec::new();
+    let mut arriving: SmallVec<[Arriving; 128]> = SmallVec::new();
     let mut total = 0.0;
     let mut node = leaf;
     loop {
         for link in links.of(node) {
-            let irradiance = light.irradiance_at(x, n, link.sender);
+            let (irradiance, share) = light.arriving_at(x, n, link.sender);
             let most = irradiance.max_element();
             if most > 0.0 {
                 total += most * link.visibility.abs().max(0.05);
-                arriving.push((irradiance, link.visibility, link.sender));
+                arriving.push(Arriving { irradiance, share, visibility: link.visibility, sender: link.sender });
             }
         }
         if node == 0 {
@@ -283,19 +285,40 @@ fn gather_at<L: LightField>(
         }
         node = light.element(node).parent;
     }
-    let (mut sum, mut rays, mut row) = (Rgb::ZERO, 0, 0.0);
+    // Light whose visibility is renewed here, and light with the visibility that links have for something larger.
+    let (mut own, mut kept) = (Gathered::default(), Gathered::default());
+    let (mut rays, mut row) = (0, Row::default());
+    let mut renewed_here: SmallVec<[u32; 64]> = SmallVec::new();
     let seed = hash(seed, 0x51ed);
-    for (irradiance, mut visibility, sender) in arriving {
+    for Arriving { irradiance, share: view, mut visibility, sender } in arriving {
         let share = irradiance.max_element() / total;
         let partial = visibility > 0.0 && visibility < 1.0;
-        if renew && visibility >= 0.0 && share > if partial { PARTIAL_SHARE } else { WHOLE_SHARE } {
+        let renewed = renew && visibility >= 0.0 && share > if partial { PARTIAL_SHARE } else { WHOLE_SHARE };
+        if renewed {
+            renewed_here.push(sender);
             let count = (share * RAYS).clamp(1.0, MOST_RAYS) as u32;
             rays += count;
             visibility = visibility_at(light, (x, n, element.source), sender, count, seed);
         }
-        sum += irradiance * visibility.abs();
-        row += light.share_at(x, n, sender) * visibility.abs();
+        let class = Class::of(light, sender);
+        *(if renewed { &mut own } else { &mut kept }).of(class) += irradiance * visibility.abs();
+        *match class {
+            Class::Emitter => &mut row.emitters,
+            _ if renewed => &mut row.own,
+            _ => &mut row.inherited,
+        } += view * visibility.abs();
     }
-    // Senders in one plane hide each other by turns: together they are no more than all there is to see.
-    (sum / row.max(1.0), rays)
+    renewed_here.sort_unstable();
+    let is_own = |sender: u32| renewed_here.binary_search(&sender).is_ok();
+    let seen = look_around(light, element.source, &[(x, n, 1.0)], seed, is_own);
+    let placed = Placed { row: row.correction(&seen), ..Placed::default() };
+    (placed.irradiance(own, kept), rays)
+}
+
+/// Light of one link at a vertex, unoccluded, and the share of the vertex's view that its sender takes up.
+struct Arriving {
+    irradiance: Rgb,
+    share: f32,
+    visibility: f32,
+    sender: u32,
 }

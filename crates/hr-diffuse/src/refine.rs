@@ -191,10 +191,11 @@ fn split_elements<L: LightField>(light: &mut MutableLight<'_, L>, wave: &[(Pair,
                     + exitant.irradiance[parent] * (element.reflectance + light.faint[element.material as usize]);
                 exitant.radiosity.push(own);
                 exitant.range.push([own, own]);
-                exitant.direction.push(element.mean_normal);
+                exitant.facing.push(element.facing);
                 exitant.irradiance.push(exitant.irradiance[parent]);
                 exitant.reflected_as.push(exitant.reflected_as[parent]);
                 exitant.peak.push(0.0);
+                exitant.gain.push(exitant.gain[parent]);
                 light.reflected.push(L::Exitant::default());
             }
         }
@@ -338,7 +339,8 @@ fn choose<L: LightField>(
     let can_split = |e: &crate::hierarchy::Element| {
         e.kind == Kind::Cluster || e.is_patch() && (e.child_count > 0 || e.radius > tolerance.smallest)
     };
-    let (receiver, sender) = (can_split(r), can_split(s));
+    // A sphere looks the same from everywhere: where it is evenly lit, its parts tell nothing new.
+    let (receiver, sender) = (can_split(r), can_split(s) && (prefer_sender || !s.whole_sphere));
     match (receiver, sender) {
         (false, false) => None,
         (true, false) => Some(Verdict::SplitReceiver),

@@ -1,7 +1,7 @@
 //! Segments between random points of two elements: how much of the sender does the receiver see?
 
 use crate::LightKind;
-use crate::hierarchy::{Element, Elements, Kind, SceneData};
+use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::sampling::{hash, point2, point4, unit};
 use crate::transport::Light;
@@ -9,15 +9,17 @@ use glam::{Vec2, Vec3};
 
 /// A point on a surface below a node.
 #[derive(Clone, Copy, Debug)]
-struct Point {
-    at: Vec3,
-    normal: Vec3,
-    surface: u32,
+pub(crate) struct Point {
+    pub(crate) at: Vec3,
+    pub(crate) normal: Vec3,
+    pub(crate) surface: u32,
+    /// Area of the part of the surface that the point was drawn from.
+    pub(crate) area: f32,
 }
 
 /// Draws a point below a node: down the tree in proportion to each child's area times `density`, then uniformly on
 /// the surface.
-fn draw(
+pub(crate) fn draw(
     scene: &SceneData,
     elements: &Elements,
     mut node: u32,
@@ -33,7 +35,7 @@ fn draw(
                 let geometry = &scene.surfaces()[element.source as usize];
                 let (at, normal, _) = geometry.sample_area(element.domain, u.x, u.y);
                 let normal = if element.kind == Kind::Back { -normal } else { normal };
-                return Some(Point { at, normal, surface: element.source });
+                return Some(Point { at, normal, surface: element.source, area: element.area });
             }
             Kind::Cluster => {
                 let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
@@ -57,8 +59,12 @@ fn draw(
     }
 }
 
-/// Visibility estimated by `count` segments: the share, weighted by the transfer's kernel, that is not blocked,
-/// and the number of rays shot. `None` where no drawn pair faced each other.
+/// Of points that do not face each other, so many pairs are drawn before a segment is given up: of closed objects every
+/// other point looks away.
+const TRIES: u32 = 6;
+
+/// Visibility estimated by the segments of a range: the weight (the transfer's kernel) that is not blocked, that of all,
+/// and the number of rays shot. All 0 where no drawn pair faced each other.
 #[must_use]
 pub(crate) fn visibility<L: LightField>(
     Light { scene, elements, exitant, .. }: Light<'_, L>,
@@ -73,28 +79,35 @@ pub(crate) fn visibility<L: LightField>(
     let (mut seen, mut total, mut rays) = (0.0, 0.0, 0);
     let source = &elements.nodes[sender as usize];
     for i in range {
-        let u = point4(seed, i);
-        let choices = [unit(hash(seed ^ 0x5bd1, i)), unit(hash(seed ^ 0x1b87, i))];
-        let Some(r) = draw(scene, elements, receiver, choices[0], Vec2::new(u.x, u.y), |_| 1.0) else { continue };
-        let (target, weight, surface) = match source.kind {
-            Kind::Light => {
-                let (to, cosine) = light_segment(scene, source, r.at, r.normal);
-                (to, cosine, u32::MAX)
-            }
-            _ => {
-                let Some(s) = draw(scene, elements, sender, choices[1], Vec2::new(u.z, u.w), power) else { continue };
-                let to = s.at - r.at;
-                let d2 = to.length_squared();
-                let (a, b) = (to.dot(r.normal), -to.dot(s.normal));
-                let weight = if a > 0.0 && b > 0.0 && d2 > 0.0 { a * b / (d2 * (d2 + source.area)) } else { 0.0 };
-                (s.at, weight, s.surface)
-            }
-        };
-        if weight > 0.0 {
-            rays += 1;
-            total += weight;
-            if !scene.visibility.occluded(r.at, target, [r.surface, surface], blocker) {
-                seen += weight;
+        for attempt in 0..TRIES {
+            let (index, round) = (i + attempt * 0x1_0000, seed ^ attempt.wrapping_mul(0x9E37));
+            let u = point4(seed, index);
+            let choices = [unit(hash(round ^ 0x5bd1, i)), unit(hash(round ^ 0x1b87, i))];
+            let important = |child: usize| if elements.nodes[child].importance > 0.0 { 1.0 } else { 0.0 };
+            let Some(r) = draw(scene, elements, receiver, choices[0], Vec2::new(u.x, u.y), important) else { continue };
+            let (target, weight, surface) = match source.kind {
+                Kind::Light => {
+                    let (to, cosine) = light_segment(scene, source.source as usize, r.at, r.normal);
+                    (to, cosine, u32::MAX)
+                }
+                _ => {
+                    let Some(s) = draw(scene, elements, sender, choices[1], Vec2::new(u.z, u.w), power) else {
+                        continue;
+                    };
+                    let to = s.at - r.at;
+                    let d2 = to.length_squared();
+                    let (a, b) = (to.dot(r.normal), -to.dot(s.normal));
+                    let weight = if a > 0.0 && b > 0.0 && d2 > 0.0 { a * b / (d2 * (d2 + s.area)) } else { 0.0 };
+                    (s.at, weight, s.surface)
+                }
+            };
+            if weight > 0.0 {
+                rays += 1;
+                total += weight;
+                if !scene.visibility.occluded(r.at, target, [r.surface, surface], blocker) {
+                    seen += weight;
+                }
+                break;
             }
         }
     }
@@ -102,11 +115,14 @@ pub(crate) fn visibility<L: LightField>(
 }
 
 /// End of a segment from `x` toward a light without extent, and the cosine at `x`.
-fn light_segment(scene: &SceneData, source: &Element, x: Vec3, n: Vec3) -> (Vec3, f32) {
-    match scene.lights[source.source as usize].kind {
+pub(crate) fn light_segment(scene: &SceneData, light: usize, x: Vec3, n: Vec3) -> (Vec3, f32) {
+    match scene.lights[light].kind {
         // Unit space is the unit cube: two of its lengths away is outside.
         LightKind::Directional { direction } => (x - direction * 2.0, -direction.dot(n)),
-        _ => (source.center, (source.center - x).normalize_or_zero().dot(n)),
+        _ => {
+            let at = scene.light_positions[light];
+            (at, (at - x).normalize_or_zero().dot(n))
+        }
     }
 }
 
@@ -122,7 +138,7 @@ pub(crate) fn visibility_at<L: LightField>(
     let source = &elements.nodes[sender as usize];
     let mut blocker = u32::MAX;
     if source.kind == Kind::Light {
-        let (to, cosine) = light_segment(scene, source, x, n);
+        let (to, cosine) = light_segment(scene, source.source as usize, x, n);
         let free = cosine > 0.0 && !scene.visibility.occluded(x, to, [surface, u32::MAX], &mut blocker);
         return if free { 1.0 } else { 0.0 };
     }
@@ -136,7 +152,7 @@ pub(crate) fn visibility_at<L: LightField>(
         let d2 = to.length_squared();
         let (a, b) = (to.dot(n), -to.dot(s.normal));
         if a > 0.0 && b > 0.0 && d2 > 0.0 {
-            let weight = a * b / (d2 * (d2 + source.area));
+            let weight = a * b / (d2 * (d2 + s.area));
             total += weight;
             if !scene.visibility.occluded(x, s.at, [surface, s.surface], &mut blocker) {
                 seen += weight;

@@ -1,24 +1,24 @@
 //! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
 
+use crate::columns::gains;
 use crate::error::SolveError;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
-use crate::hooks::{Arrived, Hierarchy, LightField, NodeId, Transfer};
+use crate::hooks::{Arrived, LightField, NodeId, Transfer};
 use crate::links::Links;
+use crate::place::{Class, Gathered, Placed, place, renewed};
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::stats::Stats;
 use crate::transport::{Exitant, Light};
 use crate::visibility::Visibility;
-use crate::{LightKind, Rgb, SceneInput};
-use glam::Vec3;
+use crate::{Facing, LightKind, Rgb, SceneInput};
 use rayon::prelude::*;
-use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// A link's tolerance is this share of the error asked for, times the mean irradiance. Chosen so that the error of
 /// the built-in scenes stays below what was asked for.
-const LINK_SHARE: f32 = 0.03;
+const LINK_SHARE: f32 = 0.1;
 /// Elements are not split below this share of the error's square root: features smaller than that are not resolved.
 const SMALLEST_SHARE: f32 = 0.008;
 /// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
@@ -34,19 +34,6 @@ const CONVERGED_SHARE: f32 = 0.02;
 const FIRST_REFLECTED: usize = 2;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
-
-/// What a leaf's own place makes of the light that was pushed down to it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Placed {
-    /// Factor for light that its ancestors received.
-    inherited: f32,
-    /// Factor for all light: below 1 where form factors would sum to more than 1.
-    limit: f32,
-}
-
-impl Placed {
-    const UNKNOWN: Self = Self { inherited: 1.0, limit: 1.0 };
-}
 
 /// What is asked of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,10 +89,10 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) stats: Stats,
     unlit: Vec<Pair>,
     /// Irradiance through a node's own links, on flat nodes.
-    own: Vec<Rgb>,
+    own: Vec<Gathered>,
     /// Light through a node's own links, on nodes that are not flat.
     transfers: Vec<Vec<Transfer>>,
-    /// By node, for leaves: see [`Placed`].
+    /// By node, for leaves.
     placed: Vec<Placed>,
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
     /// diffuse light.
@@ -142,10 +129,11 @@ impl<L: LightField> Solver<L> {
             exitant: Exitant {
                 radiosity: vec![Rgb::ZERO; count],
                 range: vec![[Rgb::ZERO; 2]; count],
-                direction: vec![Vec3::ZERO; count],
+                facing: vec![Facing::ZERO; count],
                 irradiance: vec![Rgb::ZERO; count],
                 reflected_as: (0..count as u32).collect(),
                 peak: vec![0.0; count],
+                gain: vec![1.0; count],
             },
             links: Links::default(),
             field,
@@ -162,6 +150,7 @@ impl<L: LightField> Solver<L> {
             area,
         };
         solver.pull();
+        solver.stats.skipped.sealed_sides = solver.elements.sealed;
         solver.stats.seconds.build = start.elapsed().as_secs_f64();
         Ok(solver)
     }
@@ -255,6 +244,10 @@ impl<L: LightField> Solver<L> {
         if reflects {
             let changed = self.reflect(false);
             self.pull_reflected(&changed);
+            if !changed.is_empty() {
+                let albedo = |material: u32| self.field.active(material).unwrap_or(Rgb::ZERO);
+                self.exitant.gain = gains(self.light(), &self.links, albedo);
+            }
         }
         let end = Instant::now();
         self.pull();
@@ -301,12 +294,12 @@ impl<L: LightField> Solver<L> {
         let mut own = std::mem::take(&mut self.own);
         let mut transfers = std::mem::take(&mut self.transfers);
         let mut incident = std::mem::take(&mut self.incident);
-        own.resize(count, Rgb::ZERO);
+        own.resize(count, Gathered::default());
         transfers.resize_with(count, Vec::new);
         let (light, links, field) = (self.light(), &self.links, &self.field);
         own.par_iter_mut().zip(&mut transfers).zip(&mut incident).enumerate().with_min_len(64).for_each(
             |(node, ((own, transfers), incident))| {
-                *own = Rgb::ZERO;
+                *own = Gathered::default();
                 transfers.clear();
                 let element = light.element(node as u32);
                 if element.active {
@@ -322,7 +315,7 @@ impl<L: LightField> Solver<L> {
                     }
                     let transfer = Transfer { sender: NodeId(link.sender), direction, irradiance, oriented: flat };
                     if flat {
-                        *own += irradiance;
+                        *own.of(Class::of(light, link.sender)) += irradiance;
                     } else {
                         transfers.push(transfer);
                     }
@@ -345,24 +338,24 @@ impl<L: LightField> Solver<L> {
             .with_min_len(64)
             .map(|&leaf| {
                 let element = light.element(leaf);
-                let placed = self.placed.get(leaf as usize).copied().unwrap_or(Placed::UNKNOWN);
-                // Its own links are averages over the leaf already.
-                let mut sum = Rgb::ZERO;
+                let mut inherited = Gathered::default();
                 let mut node = leaf;
                 loop {
                     if node != leaf {
-                        sum += self.own[node as usize];
+                        inherited += self.own[node as usize];
                     }
                     for transfer in &self.transfers[node as usize] {
-                        let (direction, scale) = renewed(light, transfer, element.center, node);
-                        sum += transfer.irradiance * (element.mean_cosine(direction) * scale);
+                        let (direction, scale) = renewed(light, transfer.sender.0, element.center, node);
+                        *inherited.of(Class::of(light, transfer.sender.0)) +=
+                            transfer.irradiance * (element.mean_cosine(direction) * scale);
                     }
                     if node == 0 {
                         break;
                     }
                     node = elements.nodes[node as usize].parent;
                 }
-                (self.own[leaf as usize] + sum * placed.inherited) * placed.limit
+                let placed = self.placed.get(leaf as usize).copied().unwrap_or_default();
+                placed.irradiance(self.own[leaf as usize], inherited)
             })
             .collect();
         for (leaf, sum) in leaves.into_iter().zip(sums) {
@@ -370,64 +363,10 @@ impl<L: LightField> Solver<L> {
         }
     }
 
-    /// Form factors are means over the element that a link ends at; a leaf in a corner of it sees more or less.
-    /// Compares the light that arrives at each leaf's middle with what was pushed down to it. In an enclosure
-    /// this makes every leaf's form factors sum to 1, whichever ancestors hold its links; nowhere do they sum to more,
-    /// so that light dies out wherever reflectances are below 1.
+    /// Finds out what the places of the leaves make of the light on their ancestors.
     fn place(&mut self) {
         let start = Instant::now();
-        let (elements, light) = (&self.elements, self.light());
-        let leaves: Vec<u32> = elements.patch_leaves().collect();
-        let factors: Vec<Placed> = leaves
-            .par_iter()
-            .with_min_len(16)
-            .map(|&leaf| {
-                let element = light.element(leaf);
-                let points = sample_points(&self.scene, element);
-                let (mut exact, mut pushed, mut row) = (0.0, 0.0, 0.0);
-                let mut node = leaf;
-                loop {
-                    let receiver = light.element(node);
-                    for link in self.links.of(node) {
-                        let visible = link.visibility.abs();
-                        if visible > 0.0 && node == leaf && receiver.is_flat() {
-                            row += if light.element(link.sender).is_patch() { visible * link.factor } else { 0.0 };
-                        } else if visible > 0.0 {
-                            for &(x, n, weight) in &points {
-                                exact += visible * weight * light.irradiance_at(x, n, link.sender).element_sum();
-                                row += visible * weight * light.share_at(x, n, link.sender);
-                            }
-                            let direction = light.direction_to(receiver.center, link.sender);
-                            let carried = light.emitted(link.sender, -direction).element_sum() * link.factor * visible;
-                            pushed += if receiver.is_flat() {
-                                carried
-                            } else {
-                                let transfer = Transfer {
-                                    sender: NodeId(link.sender),
-                                    direction,
-                                    irradiance: Rgb::ZERO,
-                                    oriented: false,
-                                };
-                                let (direction, scale) = renewed(light, &transfer, element.center, node);
-                                carried * element.mean_cosine(direction) * scale
-                            };
-                        }
-                    }
-                    if node == 0 {
-                        break;
-                    }
-                    node = receiver.parent;
-                }
-                // Surfaces that lie in one another's plane hide each other by turns, which no ray can tell.
-                let inherited = if pushed > 0.0 && exact > 0.0 { (exact / pushed).clamp(0.25, 4.0) } else { 1.0 };
-                Placed { inherited, limit: row.max(1.0).recip() }
-            })
-            .collect();
-        self.placed.clear();
-        self.placed.resize(elements.nodes.len(), Placed::UNKNOWN);
-        for (leaf, factor) in leaves.into_iter().zip(factors) {
-            self.placed[leaf as usize] = factor;
-        }
+        self.placed = place(self.light(), &self.links);
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 
@@ -545,13 +484,13 @@ impl<L: LightField> Solver<L> {
                 let radiosity = emitted + exitant.irradiance[node] * reflectance;
                 exitant.radiosity[node] = radiosity;
                 exitant.range[node] = [radiosity, radiosity];
-                exitant.direction[node] = element.mean_normal;
+                exitant.facing[node] = element.facing;
                 continue;
             }
             let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
             let (mut radiosity, mut irradiance, mut area) = (Rgb::ZERO, Rgb::ZERO, 0.0);
             let (mut low, mut high) = (Rgb::MAX, Rgb::ZERO);
-            let (mut direction, mut weight) = (Vec3::ZERO, 0.0);
+            let (mut facing, mut weight) = (Facing::ZERO, 0.0);
             for child in range {
                 let part = &self.elements.nodes[child];
                 if part.kind == Kind::Light {
@@ -566,7 +505,7 @@ impl<L: LightField> Solver<L> {
                 low = low.min(exitant.range[child][0]);
                 high = high.max(exitant.range[child][1]);
                 let power = exitant.radiosity[child].element_sum() * part.area;
-                direction += exitant.direction[child] * power;
+                facing.add(&exitant.facing[child], power);
                 weight += power;
             }
             if area > 0.0 {
@@ -574,7 +513,7 @@ impl<L: LightField> Solver<L> {
                 exitant.irradiance[node] = irradiance / area;
                 exitant.range[node] = [low, high];
             }
-            exitant.direction[node] = if weight > 0.0 { direction / weight } else { element.mean_normal };
+            exitant.facing[node] = if weight > 0.0 { facing.scaled(weight.recip()) } else { element.facing };
         }
     }
 
@@ -623,30 +562,6 @@ impl<L: LightField> Solver<L> {
             nodes: self.elements.nodes.len() as u64,
         }
     }
-}
-
-/// Direction and change of irradiance of a transfer as seen from a point inside of the node that received it.
-pub(crate) fn renewed<L: LightField>(light: Light<'_, L>, transfer: &Transfer, at: Vec3, node: u32) -> (Vec3, f32) {
-    let sender = light.element(transfer.sender.0);
-    let direction = light.direction_to(at, transfer.sender.0);
-    if light.elements.is_distant(transfer.sender) {
-        return (direction, 1.0);
-    }
-    let before = light.element(node).center.distance_squared(sender.center);
-    let now = at.distance_squared(sender.center);
-    // Near large senders the inverse square law ends; a factor of four is more than refinement leaves.
-    (direction, (before / now.max(1e-12)).clamp(0.25, 4.0))
-}
-
-/// Points, normals and weights (sum 1) that stand for a leaf: its middle where it is flat, four of a curved one.
-fn sample_points(scene: &SceneData, element: &crate::hierarchy::Element) -> SmallVec<[(Vec3, Vec3, f32); 4]> {
-    if element.is_flat() {
-        return smallvec![(element.center, element.normals.axis, 1.0)];
-    }
-    let geometry = &scene.surfaces()[element.source as usize];
-    let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
-    let points = geometry.quadrature(element.domain);
-    points.into_iter().map(|(uv, weight)| (geometry.point(uv), geometry.normal(uv) * side, weight)).collect()
 }
 
 /// Share of the work done: each pass costs a few times the one before.

@@ -1,10 +1,10 @@
 //! The exitant light of every node, and what of it arrives at a point.
 
 use crate::form_factor;
-use crate::hierarchy::{Element, Elements, Kind, SceneData, mean_cosine};
+use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField, NodeId};
 use crate::oracle::spot_ramp;
-use crate::{Cone, LightKind, Rgb};
+use crate::{Cone, Facing, LightKind, Rgb};
 use glam::Vec3;
 use std::f32::consts::PI;
 
@@ -15,6 +15,8 @@ const CLUSTER_FAR: f32 = 0.25;
 /// Where the radius of a part of a surface is less than this share of its distance, the point kernel replaces the
 /// closed form: its relative error is about the square, under 0.5%.
 const FAR: f32 = 0.07;
+/// The same for parts of curved surfaces, which have no closed form: up to a few percent, either way.
+const CURVED_FAR: f32 = 0.25;
 
 /// Exitant diffuse light per node.
 #[derive(Clone, Debug, Default)]
@@ -23,13 +25,15 @@ pub struct Exitant {
     pub radiosity: Vec<Rgb>,
     /// Smallest and largest radiosity below the node.
     pub range: Vec<[Rgb; 2]>,
-    /// Mean normal below the node, weighted by area and radiosity: how a cluster's light is directed.
-    pub direction: Vec<Vec3>,
+    /// Normals below the node, weighted by area and radiosity: how a cluster's light is directed.
+    pub facing: Vec<Facing>,
     /// Mean irradiance on the node's surfaces, W/m².
     pub irradiance: Vec<Rgb>,
     /// Node whose extension state holds the node's directional light: itself, or the nearest ancestor that
     /// existed when light was last reflected.
     pub reflected_as: Vec<u32>,
+    /// Factor, at most 1, for directional light, which keeps what links carry from exceeding what there is.
+    pub gain: Vec<f32>,
     /// Largest radiance (max channel, any direction) of the directional light that `reflected_as` holds.
     pub peak: Vec<f32>,
 }
@@ -69,26 +73,29 @@ impl<L: LightField> Light<'_, L> {
         match element.kind {
             Kind::Light => self.scene.lights[element.source as usize].intensity,
             Kind::Cluster => {
-                let pattern = mean_cosine(self.exitant.direction[sender as usize], away);
-                let mut light = self.exitant.radiosity[sender as usize] * pattern;
-                if element.active {
-                    light += self.field.radiance(self.state(sender), away) * PI;
-                }
-                light.max(Rgb::ZERO)
+                let pattern = self.exitant.facing[sender as usize].mean_cosine(away);
+                let diffuse = self.exitant.radiosity[sender as usize] * pattern;
+                (diffuse + self.directional(sender, away) * self.exitant.gain[sender as usize]).max(Rgb::ZERO)
             }
             Kind::Front | Kind::Back => {
-                let mut light = self.exitant.radiosity[sender as usize];
-                if element.active {
-                    let glossy = self.field.radiance(self.state(sender), away) * PI;
-                    light += if element.is_flat() {
-                        glossy
-                    } else {
-                        // Intensity per area over the mean cosine is mean radiance; near the terminator both fade.
-                        glossy / element.mean_cosine(away).max(0.05)
-                    };
-                }
-                light.max(Rgb::ZERO)
+                let diffuse = self.exitant.radiosity[sender as usize];
+                (diffuse + self.directional(sender, away) * self.exitant.gain[sender as usize]).max(Rgb::ZERO)
             }
+        }
+    }
+
+    /// The extension's part of [`emitted`](Self::emitted), before [`Exitant::gain`].
+    pub(crate) fn directional(&self, sender: u32, away: Vec3) -> Rgb {
+        let element = self.element(sender);
+        if !element.active {
+            return Rgb::ZERO;
+        }
+        let light = self.field.radiance(self.state(sender), away) * PI;
+        if element.is_flat() || element.kind == Kind::Cluster {
+            light
+        } else {
+            // Intensity per area over the mean cosine is mean radiance; near the terminator both fade.
+            light / element.mean_cosine(away).max(0.05)
         }
     }
 
@@ -172,13 +179,22 @@ impl<L: LightField> Light<'_, L> {
                 cosine.max(0.0) * element.area / (PI * d2 + element.area)
             }
             Kind::Front | Kind::Back => {
-                let to = element.center - x;
+                // Of a curved part the middle bulges out; that of its box is nearer to its centroid.
+                let middle =
+                    if element.is_flat() { element.center } else { 0.5 * (element.bounds[0] + element.bounds[1]) };
+                let to = middle - x;
                 let d2 = to.length_squared();
-                if element.radius * element.radius < FAR * FAR * d2 && !element.whole_sphere {
+                let far = if element.is_flat() { FAR } else { CURVED_FAR };
+                if element.radius * element.radius < far * far * d2 && !element.whole_sphere {
                     // Far enough to be a point with the mean of its normals.
                     let direction = to / d2.sqrt();
                     let cosines = direction.dot(n).max(0.0) * element.mean_cosine(-direction);
                     return cosines * element.area / (PI * d2);
+                }
+                if element.facets != u32::MAX && d2 > element.radius * element.radius {
+                    let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
+                    let facets = &self.elements.facets[element.facets as usize];
+                    return facets.iter().map(|f| form_factor::kernel(x, n, f.point, f.normal * side, f.area)).sum();
                 }
                 let geometry = &self.scene.surfaces()[element.source as usize];
                 form_factor::point_to_surface(geometry, &element.domain, element.kind == Kind::Back, x, n)
@@ -186,23 +202,22 @@ impl<L: LightField> Light<'_, L> {
         }
     }
 
-    /// Share of its view (cosine-weighted hemisphere) that a part of a surface takes up at a point with normal `n`, if
-    /// nothing is in between: the shares of what a point really sees never sum to more than 1. 0 for other senders:
-    /// nobody knows how much of a cluster hides behind the rest of it.
-    #[must_use]
-    pub(crate) fn share_at(&self, x: Vec3, n: Vec3, sender: u32) -> f32 {
-        let element = self.element(sender);
-        match element.kind {
-            Kind::Light | Kind::Cluster => 0.0,
-            Kind::Front | Kind::Back => self.factor_at(x, n, sender),
-        }
-    }
-
     /// Unoccluded irradiance at a point with normal `n` from a sender. Clusters and unevenly lit surfaces that are
     /// near are resolved into their parts.
     #[must_use]
     pub fn irradiance_at(&self, x: Vec3, n: Vec3, sender: u32) -> Rgb {
+        self.arriving_at(x, n, sender).0
+    }
+
+    /// What [`irradiance_at`](Self::irradiance_at) returns, and the share of its view (cosine-weighted hemisphere) that
+    /// the sender takes up at the point if nothing is in between; 0 for lights without extent. The shares of all that
+    /// a point really sees never sum to more than 1.
+    #[must_use]
+    pub(crate) fn arriving_at(&self, x: Vec3, n: Vec3, sender: u32) -> (Rgb, f32) {
         let element = self.element(sender);
+        if self.emitted_most(sender) <= 0.0 {
+            return (Rgb::ZERO, 0.0);
+        }
         let to = x - element.center;
         let distance = to.length();
         let children = element.first_child..element.first_child + element.child_count;
@@ -213,15 +228,25 @@ impl<L: LightField> Light<'_, L> {
                 element.active || (high - low).max_element() > 0.1 * high.max_element()
             };
             if resolve {
-                return children.map(|child| self.irradiance_at(x, n, child)).sum();
+                return children.fold((Rgb::ZERO, 0.0), |(light, share), child| {
+                    let (more, also) = self.arriving_at(x, n, child);
+                    (light + more, share + also)
+                });
             }
         }
         let factor = self.factor_at(x, n, sender);
         if factor <= 0.0 {
-            return Rgb::ZERO;
+            return (Rgb::ZERO, 0.0);
         }
         let away = if distance > 0.0 { to / distance } else { element.normals.axis };
-        self.emitted(sender, away) * factor
+        let light = self.emitted(sender, away) * factor;
+        let share = match element.kind {
+            Kind::Light => 0.0,
+            _ if light == Rgb::ZERO => 0.0,
+            Kind::Cluster => factor * element.mean_cosine(away),
+            Kind::Front | Kind::Back => factor,
+        };
+        (light, share)
     }
 
     /// Unit direction from `x` toward a sender; for distant light against its direction.
@@ -229,7 +254,7 @@ impl<L: LightField> Light<'_, L> {
     pub fn direction_to(&self, x: Vec3, sender: u32) -> Vec3 {
         let element = self.element(sender);
         if self.elements.is_distant(NodeId(sender)) {
-            return -element.mean_normal;
+            return -element.facing.mean;
         }
         (element.center - x).normalize_or(Vec3::Z)
     }

@@ -70,7 +70,9 @@ const FLOOR: [DVec3; 4] = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVe
 /// Mean irradiance on the front of the first surface.
 fn plate_irradiance(input: &SceneInput, error: f32) -> f64 {
     let solution = solve(input, error);
-    f64::from(solution.exitant.irradiance[solution.elements.surface_nodes[0][0] as usize].x)
+    // Sides that no light reaches have no element.
+    let node = solution.elements.surface_nodes[0][0];
+    solution.exitant.irradiance.get(node as usize).map_or(0.0, |irradiance| f64::from(irradiance.x))
 }
 
 /// Nothing else sends, so the whole error asked for belongs to this one transfer.

@@ -56,6 +56,7 @@ pub fn stats(solved: &Solved, asked: f32, error: f32, times: &Times) -> Value {
             "unlit_senders": skipped.unlit_senders,
             "facing": skipped.facing,
             "proved_free": skipped.proved_free,
+            "sealed_sides": skipped.sealed_sides,
             "converged_leaves": skipped.converged_leaves,
         },
         "iterations": stats.iterations,

@@ -125,13 +125,18 @@ fn backs_that_absorb_are_black_and_opaque() {
     let quad = Shape::Quad([DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y]);
     for (two_sided, flip) in [(false, false), (false, true), (true, false)] {
         let surface = Surface { flip, ..Surface::new(quad.clone(), 0) };
-        let solved = solved(scene_of(vec![surface], two_sided), 1.0);
+        // It shines itself, and another one below lights its back: sides that no light reaches are black, too.
+        let below = Shape::Quad([DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y].map(|p| p - DVec3::Z));
+        let solved = solved(scene_of(vec![surface, Surface::new(below, 0)], two_sided), 1.0);
         let walkthrough = Walkthrough::new(&solved, Mode::Distributions);
         let mesh = walkthrough.mesh();
         assert_eq!(mesh.check(), Ok(()), "two-sided {two_sided}, flip {flip}");
         let (mut front, mut back) = (0.0, 0.0);
         for [a, b, c] in triangles(mesh) {
             let p = |v: u32| mesh.positions[v as usize];
+            if f64::from(p(a).z) + mesh.origin.z < -0.5 {
+                continue;
+            }
             let area = 0.5 * (p(b) - p(a)).cross(p(c) - p(a)).z * if flip { -1.0 } else { 1.0 };
             if area > 0.0 {
                 front += area;

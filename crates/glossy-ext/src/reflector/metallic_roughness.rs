@@ -257,7 +257,7 @@ impl Reflector for MetallicRoughness {
         let fresnel = self.f0 * (1.0 - w_high) + Rgb::splat(w_high);
         let above = fresnel * lobe + self.remainder(w_low).max(Rgb::ZERO);
         let below = (-self.remainder(w_high)).max(Rgb::ZERO);
-        above.max(below).max_element() * 1.0001
+        above.max(below).max_element() * 1.0001 + f32::MIN_POSITIVE
     }
 
     fn glossy_albedo(&self) -> Rgb {

@@ -167,7 +167,7 @@ impl Reflector for Phong {
         let versine = 2.0 * (0.5 * nearest).sin().powi(2);
         let lobe = (self.n * (-versine.min(1.0)).ln_1p()).exp();
         // One part in 10⁴ covers the rounding of the exponentials. 0 × ln 0 is no number, but the lobe of n = 0 is 1.
-        self.scale().max_element() * if self.n > 0.0 { lobe } else { 1.0 } * 1.0001
+        self.scale().max_element() * if self.n > 0.0 { lobe } else { 1.0 } * 1.0001 + f32::MIN_POSITIVE
     }
 
     fn glossy_albedo(&self) -> Rgb {

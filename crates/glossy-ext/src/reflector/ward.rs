@@ -187,8 +187,8 @@ impl Reflector for Ward {
         let (y_low, y_high) = ((range.z_high * range.z_high).recip(), (range.z_low * range.z_low).recip());
         let y = (2.0 / falloff.max(f32::MIN_POSITIVE)).clamp(y_low, y_high);
         let lobe = 2.0 * (1.0 + range.cos_high) * y * y * (-y * falloff).exp();
-        // One part in 10⁴ covers the rounding of the exponentials.
-        self.scale().max_element() * lobe * 1.0001
+        // One part in 10⁴ covers the rounding of the exponentials, the smallest normal number that of subnormal ones.
+        self.scale().max_element() * lobe * 1.0001 + f32::MIN_POSITIVE
     }
 
     fn glossy_albedo(&self) -> Rgb {

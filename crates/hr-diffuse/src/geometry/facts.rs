@@ -1,11 +1,26 @@
 //! What the hierarchy asks of a part of a surface beside its geometry.
 
 use super::{Domain, Geometry, Profile};
+use crate::Facing;
 use glam::{Vec2, Vec3, vec2};
 use smallvec::{SmallVec, smallvec};
 
 /// Gauss–Legendre points of order 2 on 0…1.
 const GAUSS: [f32; 2] = [0.211_324_87, 0.788_675_1];
+
+/// How many [`Facet`]s stand for a curved part.
+pub const FACETS: usize = 16;
+
+/// A small piece of a curved part.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Facet {
+    /// Its middle.
+    pub point: Vec3,
+    /// Unit normal there.
+    pub normal: Vec3,
+    /// Its area.
+    pub area: f32,
+}
 
 impl Geometry {
     /// Whether it is bounded by straight edges.
@@ -83,23 +98,42 @@ impl Geometry {
         points
     }
 
-    /// Area-weighted mean of the front normals of a part: of length 1 where it is flat, 0 where it is closed.
+    /// Points, unit normals (front side) and areas of equal steps in the parameters, that stand for a curved part.
     #[must_use]
-    pub fn mean_normal(&self, domain: Domain) -> Vec3 {
+    pub fn facets(&self, domain: Domain) -> [Facet; FACETS] {
+        const SIDE: usize = 4;
+        let area = self.area(domain);
+        let mut facets = [Facet::default(); FACETS];
+        let mut sum = 0.0;
+        for (i, facet) in facets.iter_mut().enumerate() {
+            let step = |k: usize| (k as f32 + 0.5) / SIDE as f32;
+            let uv = domain.lerp(step(i % SIDE), step(i / SIDE));
+            *facet = Facet { point: self.point(uv), normal: self.normal(uv), area: self.jacobian(uv) };
+            sum += facet.area;
+        }
+        for facet in &mut facets {
+            facet.area *= area / sum.max(f32::MIN_POSITIVE);
+        }
+        facets
+    }
+
+    /// How the front normals of a part are distributed.
+    #[must_use]
+    pub fn facing(&self, domain: Domain) -> Facing {
         if self.is_flat() {
-            return self.normal(self.middle(domain));
+            return Facing::single(self.normal(self.middle(domain)));
         }
         // The midpoint rule: its symmetry makes closed surfaces come out as exactly as f32 has it.
         let steps = if domain.u1 - domain.u0 > 0.2 || domain.v1 - domain.v0 > 0.2 { 12 } else { 4 };
-        let (mut sum, mut area) = (Vec3::ZERO, 0.0);
+        let (mut sum, mut area) = (Facing::ZERO, 0.0);
         for i in 0..steps {
             for j in 0..steps {
                 let uv = domain.lerp((i as f32 + 0.5) / steps as f32, (j as f32 + 0.5) / steps as f32);
                 let weight = self.jacobian(uv);
-                sum += self.normal(uv) * weight;
+                sum.add(&Facing::single(self.normal(uv)), weight);
                 area += weight;
             }
         }
-        if area > 0.0 { sum / area } else { self.normal(self.middle(domain)) }
+        if area > 0.0 { sum.scaled(area.recip()) } else { Facing::single(self.normal(self.middle(domain))) }
     }
 }

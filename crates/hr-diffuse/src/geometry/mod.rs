@@ -20,6 +20,7 @@ pub(crate) mod tests;
 
 pub use aabb::Aabb;
 pub use error::GeometryError;
+pub use facts::{FACETS, Facet};
 pub use normalization::Normalization;
 pub(crate) use polygon::Outline;
 pub use polygon::{Quad, Triangle};

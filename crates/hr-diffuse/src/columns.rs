@@ -1,0 +1,56 @@
+//! Column sums: the directional light that a sender's links carry away is no more than it has.
+//!
+//! A link evaluates its sender's distribution in one direction, which stands for all that its receiver takes up. Where a
+//! lobe is narrower than that, links in its middle carry more power than the whole lobe has, and two mirrors that face each
+//! other would light each other up without end. So what the links of a sender carry is added up and scaled down to what it
+//! reflects.
+
+use crate::Rgb;
+use crate::hooks::LightField;
+use crate::links::Links;
+use crate::transport::Light;
+use rayon::prelude::*;
+
+/// By node: the factor, at most 1, for the directional light of all its links.
+///
+/// `albedo` is what a material reflects this way.
+pub(crate) fn gains<L: LightField>(light: Light<'_, L>, links: &Links, albedo: impl Fn(u32) -> Rgb) -> Vec<f32> {
+    let nodes = &light.elements.nodes;
+    let mut carried = vec![0.0_f32; nodes.len()];
+    let powers = links.all().par_iter().with_min_len(256).map(|link| {
+        if !light.element(link.sender).active {
+            return 0.0;
+        }
+        let receiver = light.element(link.receiver);
+        let direction = light.direction_to(receiver.center, link.sender);
+        let share = if receiver.is_flat() { 1.0 } else { receiver.mean_cosine(direction) };
+        let power = light.directional(link.sender, -direction).max(Rgb::ZERO).element_sum();
+        power * link.factor * link.visibility.abs() * receiver.area * share
+    });
+    let powers: Vec<f32> = powers.collect();
+    for (link, power) in links.all().iter().zip(powers) {
+        carried[link.sender as usize] += power;
+    }
+    // What each node has, from its leaves up.
+    let mut power = vec![0.0_f32; nodes.len()];
+    for (node, element) in nodes.iter().enumerate().rev() {
+        if element.active && element.is_patch() && element.child_count == 0 {
+            let irradiance = light.exitant.irradiance[node];
+            power[node] = (irradiance * albedo(element.material)).element_sum() * element.area;
+        }
+        if node > 0 {
+            power[element.parent as usize] += power[node];
+        }
+    }
+    // Shares of it that the links of a node and of its ancestors carry, and the most of that over the leaves below.
+    let mut share = vec![0.0_f32; nodes.len()];
+    for (node, element) in nodes.iter().enumerate() {
+        let own = if power[node] > 0.0 { carried[node] / power[node] } else { 0.0 };
+        share[node] = own + if node > 0 { share[element.parent as usize] } else { 0.0 };
+    }
+    for node in (1..nodes.len()).rev() {
+        let parent = nodes[node].parent as usize;
+        share[parent] = share[parent].max(share[node]);
+    }
+    share.into_iter().map(|share| share.max(1.0).recip()).collect()
+}

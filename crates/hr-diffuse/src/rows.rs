@@ -1,0 +1,145 @@
+//! Row sums: what a point sees of all that sends light adds up to what there is to see, 1 in an enclosure.
+//!
+//! The links of a leaf hold form factors that are means over larger elements, and visibilities from a few segments.
+//! Their sum is checked against a handful of rays from the leaf itself, which find out how much of the view is
+//! taken up by senders at all; in an enclosure that is all of it, without noise. So no light is lost or made on the way.
+
+use crate::hooks::LightField;
+use crate::place::Class;
+use crate::sampling::{hash, point2};
+use crate::transport::Light;
+use glam::{Vec2, Vec3};
+use std::f32::consts::TAU;
+
+/// Sides of the grid of directions that is drawn from at each point.
+const GRID: u32 = 7;
+/// A share of the view that is neither none nor all is known to within this: about twice the standard error of
+/// stratified rays.
+const UNCERTAIN: f32 = 0.05;
+/// Factors are raised by at most this: where more is missing, it is not known from where.
+const MOST_RAISE: f32 = 1.5;
+/// Of senders that take up this share of the view some ray would meet one.
+const SURELY_SEEN: f32 = 0.12;
+
+/// What some points really see of senders.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Seen {
+    /// Shares of the view (cosine-weighted hemisphere).
+    shares: Row,
+    /// Whether nothing but senders is seen.
+    closed: bool,
+}
+
+/// Looks around from `points`, positions with unit normals on a surface, among which the rays are dealt out. `own` tells
+/// which senders count as the place's own.
+pub(crate) fn look_around<L: LightField>(
+    light: Light<'_, L>,
+    surface: u32,
+    points: &[(Vec3, Vec3, f32)],
+    seed: u32,
+    own: impl Fn(u32) -> bool,
+) -> Seen {
+    let (mut hits, mut rays) = ([0_u16; 3], 0);
+    for (i, &(x, n, _)) in points.iter().enumerate() {
+        let (a, b) = n.any_orthonormal_pair();
+        for cell in 0..GRID * GRID {
+            if cell as usize % points.len() != i {
+                continue;
+            }
+            let jitter = point2(hash(seed, 0x2f1b), cell);
+            let u = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + jitter) / GRID as f32;
+            let (sin, cos) = (TAU * u.x).sin_cos();
+            let direction = (a * cos + b * sin) * u.y.sqrt() + n * (1.0 - u.y).sqrt();
+            rays += 1;
+            if let Some(kind) = meet(light, surface, x, direction, &own) {
+                hits[kind] += 1;
+            }
+        }
+    }
+    let [emitters, own, inherited] = hits.map(|hits| f32::from(hits) / rays.max(1) as f32);
+    Seen { shares: Row { emitters, own, inherited }, closed: hits.iter().sum::<u16>() == rays }
+}
+
+/// What a ray meets: an emitter (0), one of a place's own senders (1) or another sender (2).
+fn meet<L: LightField>(
+    light: Light<'_, L>,
+    surface: u32,
+    x: Vec3,
+    direction: Vec3,
+    own: impl Fn(u32) -> bool,
+) -> Option<usize> {
+    let hit = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface)?;
+    let mut node = light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv)?.0;
+    if light.emitted_most(node) <= 0.0 {
+        return None;
+    }
+    if Class::of(light, node) == Class::Emitter {
+        return Some(0);
+    }
+    loop {
+        if own(node) {
+            return Some(1);
+        }
+        if node == 0 {
+            return Some(2);
+        }
+        node = light.element(node).parent;
+    }
+}
+
+/// Sums of form factors times visibility at a place.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Row {
+    /// Of emitters.
+    pub(crate) emitters: f32,
+    /// Of other links that know the place itself.
+    pub(crate) own: f32,
+    /// Of links to something larger that holds it: what hides their senders there may not do so here.
+    pub(crate) inherited: f32,
+}
+
+/// Factors that make a row what it should be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Correction {
+    /// For the inherited part.
+    pub(crate) inherited: f32,
+    /// For all but emitters, the inherited part included.
+    pub(crate) rest: f32,
+    /// For everything.
+    pub(crate) all: f32,
+}
+
+impl Default for Correction {
+    fn default() -> Self {
+        Self { inherited: 1.0, rest: 1.0, all: 1.0 }
+    }
+}
+
+impl Row {
+    /// What makes this row what was seen: what is uncertain changes first, and emitters, whose links are fine, only where
+    /// they take up more than all there is.
+    pub(crate) fn correction(&self, seen: &Seen) -> Correction {
+        let mut correction = Correction::default();
+        if self.inherited > 0.0 {
+            let hidden = seen.shares.inherited <= 0.0 && self.inherited > SURELY_SEEN;
+            let goal = if hidden { 0.0 } else { within_band(self.inherited, seen.shares.inherited) };
+            correction.inherited = (goal / self.inherited).min(MOST_RAISE);
+        }
+        let rest = self.own + self.inherited * correction.inherited;
+        if rest > 0.0 {
+            let goal = if seen.closed {
+                (1.0 - self.emitters).max(0.0)
+            } else {
+                within_band(rest, seen.shares.own + seen.shares.inherited)
+            };
+            correction.rest = (goal / rest).min(MOST_RAISE);
+        }
+        correction.all = (self.emitters + rest * correction.rest).max(1.0).recip();
+        correction
+    }
+}
+
+/// What is nearest to `row` of all that a share may be of which `seen` was seen.
+fn within_band(row: f32, seen: f32) -> f32 {
+    row.clamp((seen - UNCERTAIN).max(0.0), (seen + UNCERTAIN).min(1.0))
+}
