@@ -6,6 +6,7 @@ use crate::reflector::{Incident, Reflector, Ward};
 use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_weak};
 use glam::Vec3;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
+use std::f32::consts::FRAC_PI_2;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -171,8 +172,10 @@ impl LightField for GlossyField {
         merge_weak(&mut incident);
         // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
         let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
+        // Normals that turn by an angle turn what is reflected by twice as much.
+        let narrowest = (2.0 * arrived.spread).clamp(NARROWEST, FRAC_PI_2);
         for sample in &mut incident {
-            sample.extent = sample.extent.max(if width < WIDE * NARROWEST { NARROWEST } else { 0.0 });
+            sample.extent = sample.extent.max(if width < WIDE * narrowest { narrowest } else { 0.0 });
             if sample.extent * WIDE < width {
                 sample.extent = 0.0;
             }
@@ -203,32 +206,6 @@ impl LightField for GlossyField {
             haar.scale(most / power);
         }
         haar
-    }
-
-    fn pull<H: Hierarchy>(&self, hierarchy: &H, parent: NodeId, children: &[Haar]) -> Haar {
-        let nodes = hierarchy.children(parent);
-        let area: f32 = nodes.clone().map(|child| hierarchy.area(NodeId(child))).sum();
-        if area <= 0.0 {
-            return Haar::default();
-        }
-        let flat = hierarchy.is_flat(parent);
-        let oriented: Vec<(f32, std::borrow::Cow<'_, Haar>)> = nodes
-            .zip(children)
-            .filter(|(_, haar)| !haar.is_empty())
-            .map(|(child, haar)| {
-                let child = NodeId(child);
-                let share = hierarchy.area(child) / area;
-                if !flat && hierarchy.is_flat(child) {
-                    // Radiance of a plane becomes intensity per area.
-                    let normal = hierarchy.normals(child).axis;
-                    (share, std::borrow::Cow::Owned(haar.map(|d, value| value * d.dot(normal).max(0.0))))
-                } else {
-                    (share, std::borrow::Cow::Borrowed(haar))
-                }
-            })
-            .collect();
-        let weighted: Vec<(f32, &Haar)> = oriented.iter().map(|(share, haar)| (*share, haar.as_ref())).collect();
-        Haar::average(&weighted, &self.refinement, Rgb::ZERO)
     }
 
     fn radiance(&self, exitant: &Haar, away: Vec3) -> Rgb {

@@ -3,7 +3,7 @@
 //! A link evaluates its sender's distribution in one direction, which stands for all that its receiver takes up. Where a
 //! lobe is narrower than that, links in its middle carry more power than the whole lobe has, and two mirrors that face each
 //! other would light each other up without end. So what the links of a sender carry is added up and scaled down to what it
-//! reflects.
+//! leaves to be reflected.
 
 use crate::Rgb;
 use crate::hooks::LightField;
@@ -11,10 +11,14 @@ use crate::links::Links;
 use crate::transport::Light;
 use rayon::prelude::*;
 
+/// Of what a leaf does not reflect diffusely, links may carry so much as directional light at first. What the links of a
+/// sender carry errs either way; to cut it off at what is right on average would lose light.
+pub(crate) const FREELY: f32 = 2.0;
+/// With this, light dies out in any scene.
+pub(crate) const STRICTLY: f32 = 0.9;
+
 /// By node: the factor, at most 1, for the directional light of all its links.
-///
-/// `albedo` is what a material reflects this way.
-pub(crate) fn gains<L: LightField>(light: Light<'_, L>, links: &Links, albedo: impl Fn(u32) -> Rgb) -> Vec<f32> {
+pub(crate) fn gains<L: LightField>(light: Light<'_, L>, links: &Links, most: f32) -> Vec<f32> {
     let nodes = &light.elements.nodes;
     let mut carried = vec![0.0_f32; nodes.len()];
     let powers = links.all().par_iter().with_min_len(256).map(|link| {
@@ -35,8 +39,8 @@ pub(crate) fn gains<L: LightField>(light: Light<'_, L>, links: &Links, albedo: i
     let mut power = vec![0.0_f32; nodes.len()];
     for (node, element) in nodes.iter().enumerate().rev() {
         if element.active && element.is_patch() && element.child_count == 0 {
-            let irradiance = light.exitant.irradiance[node];
-            power[node] = (irradiance * albedo(element.material)).element_sum() * element.area;
+            let glossy = light.exitant.irradiance[node] * (Rgb::ONE - element.reflectance);
+            power[node] = most * glossy.element_sum() * element.area;
         }
         if node > 0 {
             power[element.parent as usize] += power[node];

@@ -7,7 +7,10 @@
 //! 2. [`receive`](LightField::receive) once per link, on the receiver's own incident light (*gather*),
 //! 3. [`reflect`](LightField::reflect) for every active leaf, with the incident light of all nodes on the path from
 //!    the root down to it: their union is what arrives there (*push*, without a copy),
-//! 4. [`pull`](LightField::pull) for every active inner node, children before parents.
+//! 4. [`radiance`](LightField::radiance) and its bounds for the leaves that stand for a sender: inner nodes shine with
+//!    the light of leaves below them (*pull*).
+//!
+//! Leaves whose light no link asks for may be left out of 3.
 //!
 //! Receivers run in parallel; each call writes only what it is given or returns, and reads only what the step
 //! before made: gather reads exitant and writes incident light, reflect and pull the reverse.
@@ -90,6 +93,9 @@ pub struct Arrived {
     pub irradiance: Rgb,
     /// Diffuse radiance that the leaf makes of it, W/(m² sr).
     pub diffuse: Rgb,
+    /// The leaf stands for others, too, whose normals are within this angle (radians) of its own: detail finer than what
+    /// that makes of a reflection is lost.
+    pub spread: f32,
 }
 
 /// What light does besides being diffuse radiosity. `()` is the purely diffuse engine, at no cost.
@@ -117,9 +123,6 @@ pub trait LightField: Sync {
         path: &[&Self::Incident],
         arrived: Arrived,
     ) -> Self::Exitant;
-    /// The children's exitant light averaged, weighted by area. `children` are in the order of
-    /// `hierarchy.children(parent)`.
-    fn pull<H: Hierarchy>(&self, hierarchy: &H, parent: NodeId, children: &[Self::Exitant]) -> Self::Exitant;
     /// Exitant radiance (W/(m² sr)) in a direction away from a node, without the diffuse part. For nodes that are
     /// not flat: radiant intensity per unit of [`Hierarchy::area`].
     fn radiance(&self, exitant: &Self::Exitant, away: Vec3) -> Rgb;
@@ -138,7 +141,6 @@ impl LightField for () {
     fn clear(&self, (): &mut ()) {}
     fn receive(&self, (): &mut (), _: &Transfer) {}
     fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], _: Arrived) {}
-    fn pull<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[()]) {}
     fn radiance(&self, (): &(), _: Vec3) -> Rgb {
         Rgb::ZERO
     }

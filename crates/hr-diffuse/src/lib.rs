@@ -19,6 +19,7 @@ pub mod oracle;
 mod place;
 pub mod reconstruct;
 mod refine;
+pub mod reflect;
 mod rows;
 pub mod sampling;
 pub mod scene;

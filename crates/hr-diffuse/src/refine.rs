@@ -32,6 +32,11 @@ const DIRECTIONAL_SHARE: f32 = 0.05;
 const FIRST_SEGMENTS: u32 = 4;
 const MOST_SEGMENTS: u32 = 32;
 
+/// Nodes nearer than this many times the sum of their radii may be parts of one convex object, …
+const NEIGHBOURS: f32 = 2.0;
+/// … which is found out by so many pairs of points.
+const PROBES: u32 = 64;
+
 /// A link to be, between two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Pair {
@@ -266,6 +271,10 @@ fn decide<L: LightField>(
     let interval = interval(light, pair.sender, &bounds, tolerance.error / weight);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
+    let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);
+    if touching && !(r.is_flat() && s.is_flat()) && !segments::any_facing(light, pair.receiver, pair.sender, PROBES) {
+        return Verdict::Facing;
+    }
     if by_bounds > tolerance.error {
         let prefer_sender = RADIOSITY_SHARE * interval.radiosity > GEOMETRY_SHARE * interval.geometry;
         if let Some(verdict) = split(choose(light, pair, tolerance, prefer_sender)) {

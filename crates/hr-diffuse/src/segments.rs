@@ -114,6 +114,23 @@ pub(crate) fn visibility<L: LightField>(
     (seen, total, rays)
 }
 
+/// Whether any of `count` random pairs of points on two nodes face each other. Neighbouring parts of a convex object,
+/// which no bound by boxes and cones can tell apart from others, never do.
+#[must_use]
+pub(crate) fn any_facing<L: LightField>(light: Light<'_, L>, receiver: u32, sender: u32, count: u32) -> bool {
+    let (scene, elements) = (light.scene, light.elements);
+    let seed = hash(receiver, sender) ^ 0x7fac;
+    (0..count).any(|i| {
+        let u = point4(seed, i);
+        let choices = [unit(hash(seed ^ 0x5bd1, i)), unit(hash(seed ^ 0x1b87, i))];
+        let r = draw(scene, elements, receiver, choices[0], Vec2::new(u.x, u.y), |_| 1.0);
+        let s = draw(scene, elements, sender, choices[1], Vec2::new(u.z, u.w), |_| 1.0);
+        let (Some(r), Some(s)) = (r, s) else { return true };
+        let to = s.at - r.at;
+        to.dot(r.normal) > 0.0 && to.dot(s.normal) < 0.0
+    })
+}
+
 /// End of a segment from `x` toward a light without extent, and the cosine at `x`.
 pub(crate) fn light_segment(scene: &SceneData, light: usize, x: Vec3, n: Vec3) -> (Vec3, f32) {
     match scene.lights[light].kind {

@@ -31,6 +31,8 @@ pub struct Solution<L: LightField = ()> {
     pub incident: Vec<L::Incident>,
     /// What it keeps of every node's exitant light.
     pub reflected: Vec<L::Exitant>,
+    /// By material: what is reflected beside the diffuse part, where transport carried it as diffuse light.
+    pub faint: Vec<Rgb>,
     /// Work done and avoided.
     pub stats: Stats,
 }
@@ -56,6 +58,7 @@ impl<L: LightField> Solver<L> {
             field: self.field,
             incident: self.incident,
             reflected: self.reflected,
+            faint: self.faint,
             stats: self.stats,
         }
     }

@@ -1,13 +1,14 @@
 //! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
 
-use crate::columns::gains;
+use crate::columns::{FREELY, STRICTLY, gains};
 use crate::error::SolveError;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
-use crate::hooks::{Arrived, LightField, NodeId, Transfer};
+use crate::hooks::{LightField, NodeId, Transfer};
 use crate::links::Links;
 use crate::place::{Class, Gathered, Placed, place, renewed};
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
+use crate::reflect::Senders;
 use crate::stats::Stats;
 use crate::transport::{Exitant, Light};
 use crate::visibility::Visibility;
@@ -26,8 +27,6 @@ const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
 /// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
 /// diffuse light until it is shown.
 const FAINT_SHARE: f32 = 0.5;
-/// A leaf's light is reflected anew once its irradiance has changed by this share of the error asked for.
-const REFLECT_SHARE: f32 = 1.0;
 /// Iterations end when all that are to come would change the solution by less than this share of the error.
 const CONVERGED_SHARE: f32 = 0.02;
 /// The first pass that reflects the extension's light: before it, there is little light to reflect.
@@ -96,9 +95,13 @@ pub struct Solver<L: LightField = ()> {
     placed: Vec<Placed>,
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
     /// diffuse light.
-    faint: Vec<Rgb>,
+    pub(crate) faint: Vec<Rgb>,
     /// Irradiance of each leaf when its light was last reflected by the extension.
-    last_reflected: Vec<Rgb>,
+    pub(crate) last_reflected: Vec<Rgb>,
+    /// What links may carry of directional light: see [`columns`](crate::columns).
+    most_reflected: f32,
+    /// Largest radiance of each leaf's directional light (max channel).
+    pub(crate) brightest: Vec<f32>,
     /// Area whose light counts.
     area: f32,
 }
@@ -134,6 +137,7 @@ impl<L: LightField> Solver<L> {
                 reflected_as: (0..count as u32).collect(),
                 peak: vec![0.0; count],
                 gain: vec![1.0; count],
+                senders: Senders::default(),
             },
             links: Links::default(),
             field,
@@ -147,6 +151,8 @@ impl<L: LightField> Solver<L> {
             placed: Vec::new(),
             faint,
             last_reflected: Vec::new(),
+            most_reflected: FREELY,
+            brightest: Vec::new(),
             area,
         };
         solver.pull();
@@ -170,6 +176,9 @@ impl<L: LightField> Solver<L> {
                     self.place();
                 }
                 let residual = self.iterate(pass >= FIRST_REFLECTED);
+                if self.grows() {
+                    self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
+                }
                 let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
                 stopped |= watch(&self.progress(Phase::Transport, fraction, *looseness)).is_break();
                 if self.remaining(residual) < goal || stopped && iteration > 0 {
@@ -242,11 +251,8 @@ impl<L: LightField> Solver<L> {
         self.push();
         let middle = Instant::now();
         if reflects {
-            let changed = self.reflect(false);
-            self.pull_reflected(&changed);
-            if !changed.is_empty() {
-                let albedo = |material: u32| self.field.active(material).unwrap_or(Rgb::ZERO);
-                self.exitant.gain = gains(self.light(), &self.links, albedo);
+            if self.reflect_senders() {
+                self.exitant.gain = gains(self.light(), &self.links, self.most_reflected);
             }
         }
         let end = Instant::now();
@@ -266,15 +272,6 @@ impl<L: LightField> Solver<L> {
         self.stats.iterations += 1;
         self.stats.residuals.push(residual);
         residual
-    }
-
-    /// Reflects the incident light of all leaves once more, of those too whose glossy part was carried as diffuse
-    /// light: the final reflection of all accumulated samples (paper, section 3.4), for display by distributions.
-    pub fn reflect_for_display(&mut self) {
-        let start = Instant::now();
-        let changed = self.reflect(true);
-        self.pull_reflected(&changed);
-        self.stats.seconds.reflect += start.elapsed().as_secs_f64();
     }
 
     /// Read access to hierarchy and exitant light.
@@ -370,105 +367,6 @@ impl<L: LightField> Solver<L> {
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 
-    /// The extension turns the incident light of its leaves into exitant light.
-    /// Tells which leaves changed.
-    fn reflect(&mut self, shown: bool) -> Vec<u32> {
-        let elements = &self.elements;
-        if !elements.nodes[0].active {
-            return Vec::new();
-        }
-        let tolerance = REFLECT_SHARE * self.settings.error;
-        self.last_reflected.resize(elements.nodes.len(), Rgb::splat(f32::NEG_INFINITY));
-        let strong = |leaf: &u32| {
-            let element = &elements.nodes[*leaf as usize];
-            element.active && (shown || self.faint[element.material as usize] == Rgb::ZERO)
-        };
-        let leaves: Vec<u32> = elements.patch_leaves().filter(strong).collect();
-        let all = leaves.len() as u64;
-        let leaves: Vec<u32> = leaves
-            .into_iter()
-            .filter(|&leaf| {
-                let now = self.exitant.irradiance[leaf as usize];
-                let change = (now - self.last_reflected[leaf as usize]).abs().max_element();
-                change > tolerance * now.max_element()
-            })
-            .collect();
-        self.stats.skipped.converged_leaves += all - leaves.len() as u64;
-        let exitant: Vec<L::Exitant> = leaves
-            .par_iter()
-            .map(|&leaf| {
-                let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
-                let mut node = leaf;
-                while node != 0 {
-                    node = elements.nodes[node as usize].parent;
-                    path.push(&self.incident[node as usize]);
-                }
-                path.reverse();
-                let element = &elements.nodes[leaf as usize];
-                let irradiance = self.exitant.irradiance[leaf as usize];
-                let diffuse = irradiance * element.reflectance * std::f32::consts::FRAC_1_PI;
-                self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse })
-            })
-            .collect();
-        for (&leaf, exitant) in leaves.iter().zip(exitant) {
-            self.reflected[leaf as usize] = exitant;
-            self.last_reflected[leaf as usize] = self.exitant.irradiance[leaf as usize];
-        }
-        leaves
-    }
-
-    /// The extension averages its exitant light bottom-up, all nodes of one height in parallel. Only what is above
-    /// the leaves that changed is averaged anew.
-    fn pull_reflected(&mut self, changed: &[u32]) {
-        let elements = &self.elements;
-        let count = elements.nodes.len();
-        let mut height = vec![0_u32; count];
-        let mut stale = vec![false; count];
-        for &leaf in changed {
-            stale[leaf as usize] = true;
-        }
-        let mut layers: Vec<Vec<u32>> = Vec::new();
-        for node in (0..count).rev() {
-            let element = &elements.nodes[node];
-            let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
-            if let Some(tallest) = height[range].iter().copied().max() {
-                height[node] = tallest + 1;
-            }
-            if stale[node] {
-                stale[element.parent as usize] = true;
-                if element.child_count > 0 {
-                    let layer = height[node] as usize - 1;
-                    layers.resize_with(layers.len().max(layer + 1), Vec::new);
-                    layers[layer].push(node as u32);
-                }
-            }
-        }
-        for layer in layers {
-            let averages: Vec<L::Exitant> = layer
-                .par_iter()
-                .map(|&node| {
-                    let element = &elements.nodes[node as usize];
-                    let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
-                    self.field.pull(elements, NodeId(node), &self.reflected[range])
-                })
-                .collect();
-            for (node, average) in layer.into_iter().zip(averages) {
-                self.reflected[node as usize] = average;
-            }
-        }
-        for (node, source) in self.exitant.reflected_as.iter_mut().enumerate() {
-            *source = node as u32;
-        }
-        let (field, reflected) = (&self.field, &self.reflected);
-        let nodes = self.exitant.peak.par_iter_mut().zip(reflected).zip(&stale);
-        nodes.for_each(|((peak, light), &stale)| {
-            if stale {
-                let (low, high) = field.radiance_bounds(light, &crate::Cone::SPHERE);
-                *peak = high.max(-low).max_element().max(0.0);
-            }
-        });
-    }
-
     /// Diffuse radiosity of the leaves, averaged bottom-up with its range and direction.
     fn pull(&mut self) {
         let exitant = &mut self.exitant;
@@ -538,6 +436,12 @@ impl<L: LightField> Solver<L> {
             power += f64::from(light.intensity.max_element() * spread);
         }
         if area > 0.0 { (lit / area) as f32 } else { (power / f64::from(self.area)) as f32 }
+    }
+
+    /// Whether each of the last iterations changed more than the one before: light that does not die out.
+    fn grows(&self) -> bool {
+        let last = &self.stats.residuals[self.stats.residuals.len().saturating_sub(4)..];
+        last.len() == 4 && last.windows(2).all(|pair| pair[1] > pair[0])
     }
 
     /// What all iterations to come would change, if the residuals go on shrinking as they did last: the sum of the

@@ -4,6 +4,7 @@ use crate::form_factor;
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField, NodeId};
 use crate::oracle::spot_ramp;
+use crate::reflect::Senders;
 use crate::{Cone, Facing, LightKind, Rgb};
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -29,12 +30,13 @@ pub struct Exitant {
     pub facing: Vec<Facing>,
     /// Mean irradiance on the node's surfaces, W/m².
     pub irradiance: Vec<Rgb>,
-    /// Node whose extension state holds the node's directional light: itself, or the nearest ancestor that
-    /// existed when light was last reflected.
+    /// Leaves that stand for the senders of directional light.
+    pub senders: Senders,
+    /// Node whose leaves stand for a node: itself, or the nearest ancestor that sent when light was last reflected.
     pub reflected_as: Vec<u32>,
     /// Factor, at most 1, for directional light, which keeps what links carry from exceeding what there is.
     pub gain: Vec<f32>,
-    /// Largest radiance (max channel, any direction) of the directional light that `reflected_as` holds.
+    /// Most radiance (max channel, any direction) of the leaves that stand for a node.
     pub peak: Vec<f32>,
 }
 
@@ -58,10 +60,6 @@ impl<L: LightField> Copy for Light<'_, L> {}
 impl<L: LightField> Light<'_, L> {
     pub(crate) fn element(&self, node: u32) -> &Element {
         &self.elements.nodes[node as usize]
-    }
-
-    fn state(&self, node: u32) -> &L::Exitant {
-        &self.reflected[self.exitant.reflected_as[node as usize] as usize]
     }
 
     /// What a sender emits in a direction away from it, in the units that [`Link::factor`](crate::links::Link)
@@ -90,12 +88,24 @@ impl<L: LightField> Light<'_, L> {
         if !element.active {
             return Rgb::ZERO;
         }
-        let light = self.field.radiance(self.state(sender), away) * PI;
-        if element.is_flat() || element.kind == Kind::Cluster {
-            light
-        } else {
-            // Intensity per area over the mean cosine is mean radiance; near the terminator both fade.
-            light / element.mean_cosine(away).max(0.05)
+        let state = self.exitant.reflected_as[sender as usize];
+        let holder = self.element(state);
+        let mut light = Rgb::ZERO;
+        for &(leaf, share) in self.exitant.senders.of(state) {
+            let part = self.element(leaf);
+            // Radiance of a plane becomes intensity per area.
+            let cosine = if part.is_flat() && !holder.is_flat() { part.normals.axis.dot(away).max(0.0) } else { 1.0 };
+            if cosine > 0.0 {
+                light += self.field.radiance(&self.reflected[leaf as usize], away) * (cosine * share * PI);
+            }
+        }
+        // Intensity per area over the mean cosine is mean radiance; near the terminator both fade.
+        match (holder.is_flat(), element.kind == Kind::Cluster) {
+            (true, false) => light,
+            (false, false) => light / holder.mean_cosine(away).max(0.05),
+            (_, true) if state == sender => light,
+            (true, true) => light * element.mean_cosine(away),
+            (false, true) => light * (element.mean_cosine(away) / holder.mean_cosine(away).max(0.05)),
         }
     }
 
@@ -110,15 +120,19 @@ impl<L: LightField> Light<'_, L> {
         }
         let [mut low, mut high] = self.diffuse_range(sender);
         if element.active {
-            let (least, most) = self.field.radiance_bounds(self.state(sender), away);
-            let scale = if element.is_flat() {
-                PI
-            } else {
-                // Intensity per area is at most the mean cosine times radiance, and that is at most 1.
-                PI / element.mean_cosine(away.axis).max(0.25)
-            };
-            low += least * scale;
-            high += most * scale;
+            let state = self.exitant.reflected_as[sender as usize];
+            let holder = self.element(state);
+            // Intensity per area is at most the mean cosine times radiance, and that is at most 1.
+            let scale = if holder.is_flat() { PI } else { PI / holder.mean_cosine(away.axis).max(0.25) };
+            for &(leaf, share) in self.exitant.senders.of(state) {
+                let (least, most) = self.field.radiance_bounds(&self.reflected[leaf as usize], away);
+                let part = self.element(leaf);
+                let (dim, bright) =
+                    if part.is_flat() && !holder.is_flat() { part.normals.cosines_with(away) } else { (1.0, 1.0) };
+                let (dim, bright) = (dim.max(0.0) * share * scale, bright.max(0.0) * share * scale);
+                low += least.max(Rgb::ZERO) * dim + least.min(Rgb::ZERO) * bright;
+                high += most.max(Rgb::ZERO) * bright;
+            }
         }
         (low.max(Rgb::ZERO), high.max(Rgb::ZERO))
     }
@@ -263,11 +277,5 @@ impl<L: LightField> Light<'_, L> {
     #[must_use]
     pub fn elements(&self) -> &Elements {
         self.elements
-    }
-
-    /// What an extension keeps of a node's exitant light.
-    #[must_use]
-    pub fn reflected(&self, node: NodeId) -> &L::Exitant {
-        self.state(node.0)
     }
 }

@@ -19,6 +19,8 @@ use std::sync::Arc;
 const FOLLOWED: f32 = 0.14;
 /// Rays that follow a narrow lobe, per ray of the pixel.
 const LOBE_RAYS: u32 = 6;
+/// Senders seen by way of another reflection count as at least so wide (radians).
+const NARROWEST: f32 = 0.03;
 /// Mirrors in mirrors end here.
 const MOST_BOUNCES: u32 = 4;
 /// Rays start this far from their surface (unit space): what rounding needs.
@@ -137,6 +139,14 @@ impl<'a> RayCaster<'a> {
             Mode::Samples if bounce == 0 => self.reflected(&met, bounce, seed, scratch),
             Mode::Samples if met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES => {
                 self.reflected(&met, bounce, seed, scratch)
+            }
+            Mode::Samples if self.solution.faint[material_index as usize] != Rgb::ZERO => {
+                self.solution.faint[material_index as usize] * irradiance * FRAC_1_PI
+            }
+            // Of leaves whose light no link asked for there is no distribution.
+            Mode::Samples if self.solution.reflected[leaf.index()].is_empty() => {
+                let place = Place::new(met.hit.point, met.normal);
+                glossy::reflected(self.solution, &*met.reflector, leaf, &place, away, NARROWEST, scratch)
             }
             Mode::Samples => glossy::leaving(self.solution, leaf, away),
         };

@@ -50,7 +50,7 @@ impl Default for Refinement {
             min_level: 1,
             max_level: 6,
             refiner: Refiner::Interpolation(0.1),
-            negligible: 1e-3,
+            negligible: 1e-2,
             preserve_energy: true,
         }
     }

@@ -1,0 +1,234 @@
+//! Reflect and pull (paper, section 3.3): the extension turns the incident light of leaves into exitant light, and inner
+//! nodes shine with that of the leaves below. Both only where some link asks for it: of the thousands of leaves below
+//! a distant cluster a few stand for all, and their light is added up in the direction asked for, which costs less than
+//! averages over all directions.
+
+use crate::hierarchy::Elements;
+use crate::hooks::{Arrived, LightField, NodeId};
+use crate::links::Links;
+use crate::sampling::{hash, unit};
+use crate::solver::Solver;
+use crate::{Cone, Rgb};
+use rayon::prelude::*;
+use smallvec::SmallVec;
+use std::f32::consts::FRAC_1_PI;
+
+/// So many leaves at most stand for all that are below a sender.
+const REPRESENTATIVES: usize = 16;
+/// A leaf's light is reflected anew once its irradiance has changed by this share of the error asked for.
+const REFLECT_SHARE: f32 = 1.0;
+
+/// Leaves, and the area that each stands for.
+type Representatives = SmallVec<[(u32, f32); 16]>;
+
+/// Whose directional light the links ask for: for each node the leaves that stand for it.
+#[derive(Clone, Debug, Default)]
+pub struct Senders {
+    /// By node: where its leaves are in `standing`. Empty for nodes that do not send.
+    ranges: Vec<[u32; 2]>,
+    /// Leaves, and the share of the sender's area that each stands for.
+    standing: Vec<(u32, f32)>,
+}
+
+impl Senders {
+    /// Those of a set of links. `reflects` tells of which leaves the extension makes directional light.
+    pub(crate) fn new(elements: &Elements, links: &Links, reflects: impl Fn(u32) -> bool) -> Self {
+        let nodes = &elements.nodes;
+        let mut sends = vec![false; nodes.len()];
+        for link in links.all() {
+            sends[link.sender as usize] = nodes[link.sender as usize].active;
+        }
+        // Whether the node or any above it sends.
+        let mut below = sends.clone();
+        for node in 1..nodes.len() {
+            below[node] |= below[nodes[node].parent as usize];
+        }
+        let mut senders = Self { ranges: vec![[0; 2]; nodes.len()], standing: Vec::new() };
+        let mut standing: Vec<Representatives> = vec![Representatives::new(); nodes.len()];
+        for node in (0..nodes.len()).rev() {
+            let element = &nodes[node];
+            if !below[node] || !element.active {
+                continue;
+            }
+            if element.child_count == 0 {
+                if reflects(node as u32) {
+                    standing[node].push((node as u32, element.area));
+                }
+            } else {
+                let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
+                let all: Vec<(u32, f32)> = standing[children].iter().flatten().copied().collect();
+                standing[node] = thinned(all, node as u32);
+            }
+            if sends[node] {
+                let first = senders.standing.len() as u32;
+                senders.standing.extend(standing[node].iter().map(|&(leaf, area)| (leaf, area / element.area)));
+                senders.ranges[node] = [first, senders.standing.len() as u32];
+            }
+        }
+        senders
+    }
+
+    /// The leaves that stand for a node, and their shares of its area.
+    #[must_use]
+    pub fn of(&self, node: u32) -> &[(u32, f32)] {
+        let [first, end] = self.ranges.get(node as usize).copied().unwrap_or_default();
+        &self.standing[first as usize..end as usize]
+    }
+
+    /// All leaves that stand for something, in order, each with the angle within which the normals are for which it
+    /// stands: the least where it stands for several nodes.
+    fn leaves(&self, elements: &Elements) -> Vec<Standing> {
+        let mut leaves: Vec<Standing> = Vec::with_capacity(self.standing.len());
+        for (node, element) in elements.nodes.iter().enumerate() {
+            let standing = self.of(node as u32);
+            // As if they divided the cone of normals among them.
+            let spread = element.normals.angle() / (standing.len() as f32).sqrt();
+            let spread = if element.child_count == 0 || spread.is_nan() { 0.0 } else { spread };
+            leaves.extend(standing.iter().map(|&(leaf, _)| Standing { leaf, spread }));
+        }
+        leaves.sort_unstable_by(|a, b| a.leaf.cmp(&b.leaf).then(a.spread.total_cmp(&b.spread)));
+        leaves.dedup_by_key(|standing| standing.leaf);
+        leaves
+    }
+}
+
+/// A leaf that stands for others, whose normals are within an angle (radians) of its own.
+#[derive(Clone, Copy, Debug)]
+struct Standing {
+    leaf: u32,
+    spread: f32,
+}
+
+/// A few of many, in proportion to the area that they stand for.
+fn thinned(all: Vec<(u32, f32)>, seed: u32) -> Representatives {
+    if all.len() <= REPRESENTATIVES {
+        return all.into_iter().collect();
+    }
+    let step = all.iter().map(|(_, area)| area).sum::<f32>() / REPRESENTATIVES as f32;
+    let mut chosen = Representatives::new();
+    let mut passed = 0.0;
+    let mut candidates = all.iter();
+    let mut candidate = candidates.next();
+    for i in 0..REPRESENTATIVES {
+        let goal = (i as f32 + unit(hash(seed, i as u32))) * step;
+        while let Some((_, area)) = candidate
+            && passed + area < goal
+            && candidates.len() > 0
+        {
+            passed += area;
+            candidate = candidates.next();
+        }
+        let Some(&(leaf, _)) = candidate else { break };
+        match chosen.last_mut() {
+            Some((last, area)) if *last == leaf => *area += step,
+            _ => chosen.push((leaf, step)),
+        }
+    }
+    chosen
+}
+
+impl<L: LightField> Solver<L> {
+    /// Reflects the light of the leaves that stand for what the links ask for, where it has changed. Tells whether any has.
+    pub(crate) fn reflect_senders(&mut self) -> bool {
+        let count = self.elements.nodes.len();
+        if !self.elements.nodes[0].active {
+            return false;
+        }
+        self.last_reflected.resize(count, Rgb::splat(f32::NEG_INFINITY));
+        let (elements, faint) = (&self.elements, &self.faint);
+        let senders = Senders::new(elements, &self.links, |leaf| {
+            faint[elements.nodes[leaf as usize].material as usize] == Rgb::ZERO
+        });
+        let leaves = senders.leaves(elements);
+        let changed = self.reflect(&leaves);
+        let mut stands = vec![false; count];
+        for standing in leaves {
+            stands[standing.leaf as usize] = true;
+        }
+        for (node, stands) in stands.into_iter().enumerate() {
+            if !stands && self.last_reflected[node] != Rgb::splat(f32::NEG_INFINITY) {
+                self.reflected[node] = L::Exitant::default();
+                self.last_reflected[node] = Rgb::splat(f32::NEG_INFINITY);
+            }
+        }
+        self.exitant.senders = senders;
+        self.refer(&changed);
+        !changed.is_empty()
+    }
+
+    /// Finds the node whose leaves stand for each node, and how bright it is at most.
+    fn refer(&mut self, changed: &[u32]) {
+        let (field, reflected) = (&self.field, &self.reflected);
+        let brightest: Vec<f32> = changed
+            .par_iter()
+            .map(|&leaf| {
+                let (low, high) = field.radiance_bounds(&reflected[leaf as usize], &Cone::SPHERE);
+                high.max(-low).max_element().max(0.0)
+            })
+            .collect();
+        self.brightest.resize(self.elements.nodes.len(), 0.0);
+        for (&leaf, brightest) in changed.iter().zip(brightest) {
+            self.brightest[leaf as usize] = brightest;
+        }
+        for node in 0..self.elements.nodes.len() {
+            let standing = self.exitant.senders.of(node as u32);
+            let parent = self.elements.nodes[node].parent as usize;
+            self.exitant.peak[node] = standing.iter().map(|&(leaf, share)| self.brightest[leaf as usize] * share).sum();
+            self.exitant.reflected_as[node] =
+                if standing.is_empty() && node > 0 { self.exitant.reflected_as[parent] } else { node as u32 };
+        }
+    }
+
+    /// The extension turns the incident light of leaves into exitant light where it has changed. Tells where.
+    fn reflect(&mut self, leaves: &[Standing]) -> Vec<u32> {
+        let elements = &self.elements;
+        let tolerance = REFLECT_SHARE * self.settings.error;
+        let changed: Vec<Standing> = leaves
+            .iter()
+            .copied()
+            .filter(|&Standing { leaf, .. }| {
+                let now = self.exitant.irradiance[leaf as usize];
+                let change = (now - self.last_reflected[leaf as usize]).abs().max_element();
+                change > tolerance * now.max_element()
+            })
+            .collect();
+        self.stats.skipped.converged_leaves += (leaves.len() - changed.len()) as u64;
+        let exitant: Vec<L::Exitant> = changed
+            .par_iter()
+            .map(|&Standing { leaf, spread }| {
+                let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
+                let mut node = leaf;
+                while node != 0 {
+                    node = elements.nodes[node as usize].parent;
+                    path.push(&self.incident[node as usize]);
+                }
+                path.reverse();
+                let element = &elements.nodes[leaf as usize];
+                let irradiance = self.exitant.irradiance[leaf as usize];
+                let diffuse = irradiance * element.reflectance * FRAC_1_PI;
+                self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse, spread })
+            })
+            .collect();
+        for (Standing { leaf, .. }, exitant) in changed.iter().zip(exitant) {
+            self.reflected[*leaf as usize] = exitant;
+            self.last_reflected[*leaf as usize] = self.exitant.irradiance[*leaf as usize];
+        }
+        changed.into_iter().map(|standing| standing.leaf).collect()
+    }
+
+    /// Reflects the incident light of all leaves once more, of those too whose light no link asked for or was carried as
+    /// diffuse light: the final reflection of all accumulated samples (paper, section 3.4), for display by distributions.
+    pub fn reflect_for_display(&mut self) {
+        let start = std::time::Instant::now();
+        self.last_reflected.resize(self.elements.nodes.len(), Rgb::splat(f32::NEG_INFINITY));
+        let active = |leaf: &u32| self.elements.nodes[*leaf as usize].active;
+        let leaves = self.elements.patch_leaves().filter(active).map(|leaf| Standing { leaf, spread: 0.0 });
+        let leaves: Vec<Standing> = leaves.collect();
+        // Those that stood for others are to show their own detail now.
+        for Standing { leaf, .. } in &leaves {
+            self.last_reflected[*leaf as usize] = Rgb::splat(f32::NEG_INFINITY);
+        }
+        self.reflect(&leaves);
+        self.stats.seconds.reflect += start.elapsed().as_secs_f64();
+    }
+}
