@@ -10,11 +10,11 @@
 //! they are, not for polygons.
 
 mod mtl;
-mod polygon;
 #[cfg(test)]
 mod tests;
 
 use crate::mesh::{Face, MAX_SURFACES, Part, Vertices, merge, place};
+use crate::polygon::{Piece, pieces};
 use crate::warnings::Warnings;
 use crate::{Primaries, Scene, SceneError};
 use glam::{DMat4, DVec3, Vec2, Vec3};
@@ -260,17 +260,17 @@ impl<'a> Reader<'a> {
         if has_colors {
             group.vertices.colors.extend(corners.iter().filter_map(|c| self.colors[of(c[0])]));
         }
-        if points.len() == 4 && polygon::is_planar_convex(&points) {
-            group.quads.push(Face { corners: [first, first + 1, first + 2, first + 3] });
-            return Ok(());
-        }
-        let triangles = polygon::triangles(&points);
-        group.triangles.extend(triangles.iter().map(|t| t.map(|i| first + i)));
-        if triangles.len() != points.len() - 2 {
-            warnings.add(
-                "part of a polygon is left out: it crosses itself, or is not convex and has more than 256 corners",
-                || self.place(line),
-            );
+        let vertex = |corner: usize| first + corner as u32;
+        match pieces(&points, &[]) {
+            Ok(pieces) => {
+                for piece in pieces {
+                    match piece {
+                        Piece::Triangle(corners) => group.triangles.push(corners.map(vertex)),
+                        Piece::Quad(corners) => group.quads.push(Face { corners: corners.map(vertex) }),
+                    }
+                }
+            }
+            Err(error) => warnings.add(format!("face with {error}: left out"), || self.place(line)),
         }
         Ok(())
     }

@@ -68,8 +68,9 @@ fn quadrilaterals_stay_and_triangle_pairs_merge() {
 }
 
 #[test]
-fn polygons_fall_into_triangles() {
+fn polygons_fall_into_pieces() {
     let scene = parse("v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5 6\n");
+    assert_eq!(scene.surfaces.len(), 2, "an L is two quadrilaterals");
     let area: f64 = (scene.surfaces.iter())
         .map(|s| match &s.shape {
             Shape::Triangle([a, b, c]) => 0.5 * (*b - *a).cross(*c - *a).z,
@@ -79,7 +80,8 @@ fn polygons_fall_into_triangles() {
         .sum();
     assert!((area - 3.0).abs() < 1e-12, "the area of the L: {area}");
     let crossed = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 2 0\nv 0 2 0\nv 5 1 0\nf 1 2 3 4 5 6\nf 1 2 3\n");
-    assert!(!crossed.surfaces.is_empty(), "crossed polygons do not stop the rest");
+    assert_eq!(crossed.surfaces.len(), 1, "crossed polygons do not stop the rest");
+    assert!(warned(&crossed, "crosses itself"), "they are told of: {:?}", crossed.warnings);
 }
 
 #[test]
