@@ -5,6 +5,29 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Temporary files that are neither renamed nor removed yet.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes what is half written, for a program that is about to end in the middle of its work. As long as the result
+/// lives, no file is begun or finished.
+pub fn abandon() -> Abandoned {
+    let list = unfinished();
+    for path in &*list {
+        // What cannot be removed stays; the program has no time left to tell.
+        let _ = fs::remove_file(path);
+    }
+    Abandoned(list)
+}
+
+/// See [`abandon`].
+#[must_use]
+pub struct Abandoned(#[expect(dead_code, reason = "it is there to be held")] MutexGuard<'static, Vec<PathBuf>>);
 
 /// Writes a file through a temporary one in the same folder, renamed when it is complete, so that nobody ever sees
 /// half a file and an older one survives a failure. A symbolic link keeps pointing where it did. Where `path` is no
@@ -35,7 +58,7 @@ fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>)
     fill(&mut out)?;
     // Data first, name after: a crash in between must not leave an empty file under the final name.
     out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-    fs::rename(&partial.0, &place)
+    partial.finish(&place)
 }
 
 /// A temporary file that goes away unless it is renamed: its name is free then, and there is nothing to remove.
@@ -54,19 +77,31 @@ impl Partial {
             hidden.push(name);
             hidden.push(format!(".{}-{number}.partial", std::process::id()));
             let path = place.with_file_name(hidden);
+            let mut list = unfinished();
             match File::create_new(&path) {
-                Ok(file) => return Ok((file, Self(path))),
+                Ok(file) => {
+                    list.push(path.clone());
+                    return Ok((file, Self(path)));
+                }
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(e) => return Err(e),
             }
         }
     }
+
+    /// Gives it its name.
+    fn finish(self, place: &Path) -> io::Result<()> {
+        let _held = unfinished();
+        fs::rename(&self.0, place)
+    }
 }
 
 impl Drop for Partial {
     fn drop(&mut self) {
+        let mut list = unfinished();
         // Already failing; the first error is the one to report.
         let _ = fs::remove_file(&self.0);
+        list.retain(|path| *path != self.0);
     }
 }
 
