@@ -16,6 +16,7 @@ mod tests;
 use crate::mesh::{Face, MAX_SURFACES, Part, Vertices, merge, place};
 use crate::polygon::{Piece, pieces};
 use crate::warnings::Warnings;
+use crate::whole_file;
 use crate::{Primaries, Scene, SceneError};
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use glossy_ext::Rgb;
@@ -31,8 +32,7 @@ use std::str::SplitWhitespace;
 /// is wrong, [`SceneError::Empty`] where it has no polygon. Missing libraries, materials and images are only warned
 /// of; grey stands in for a missing material.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
-    from_bytes(&bytes, path)
+    from_bytes(&whole_file::read_whole(path)?, path)
 }
 
 /// As [`load`], for a file's contents; `path` is where other files are looked for, and its name.
@@ -193,7 +193,7 @@ impl<'a> Reader<'a> {
                 let whole = base.join(rest);
                 let files = if whole.is_file() { vec![whole] } else { words.map(|name| base.join(name)).collect() };
                 for file in files {
-                    match std::fs::read(&file) {
+                    match whole_file::read(&file) {
                         Ok(bytes) => self.library.read(&bytes, &file, warnings)?,
                         Err(e) => warnings
                             .add(format!("material library '{}' cannot be read: {e}", file.display()), || {

@@ -1,4 +1,4 @@
-//! Files that are written whole or not at all.
+//! Files: read whole, and written whole or not at all.
 
 use crate::SceneError;
 use std::fs::{self, File};
@@ -6,6 +6,19 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// The contents of a regular file; others might never end.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("not a regular file"));
+    }
+    fs::read(path)
+}
+
+/// As [`read`], with an error that names the file.
+pub(crate) fn read_whole(path: &Path) -> Result<Vec<u8>, SceneError> {
+    read(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })
+}
 
 /// Temporary files that are neither renamed nor removed yet.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -135,6 +148,20 @@ mod tests {
             write_whole(&path, |out| out.write_all(b"x")).expect_err("cannot be written");
         }
         assert!(folder.names().is_empty(), "nothing is left");
+    }
+
+    #[test]
+    fn only_regular_files_are_read() {
+        let folder = Folder::new("whole-file-read");
+        let path = folder.path("a.bin");
+        write_whole(&path, |out| out.write_all(b"all")).expect("written");
+        assert_eq!(read_whole(&path).expect("there"), b"all", "its contents");
+        let error = read_whole(&folder.path("")).expect_err("a folder").to_string();
+        assert!(error.ends_with("not a regular file"), "'{error}'");
+        if cfg!(unix) {
+            let error = read(Path::new("/dev/zero")).expect_err("it has no end").to_string();
+            assert_eq!(error, "not a regular file", "refused at once");
+        }
     }
 
     #[cfg(unix)]
