@@ -17,6 +17,7 @@ mod tests;
 
 use crate::mesh::{MAX_SURFACES, Part, Vertices, merge, place};
 use crate::warnings::Warnings;
+use crate::whole_file::read_whole;
 use crate::{Camera, Primaries, Scene, SceneError};
 use document::Document;
 use glam::{DMat4, DQuat, DVec3, Vec2, Vec3};
@@ -49,8 +50,7 @@ const MIN_RAMP: f32 = 1e-4;
 /// where it is damaged, contradicts the specification or requires an extension that is not supported,
 /// [`SceneError::Empty`] where it has no triangle. Images that cannot be read are only warned of.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
-    from_bytes(&bytes, path)
+    from_bytes(&read_whole(path)?, path)
 }
 
 /// As [`load`], for a file's contents; `path` is where other files are looked for, and its name.

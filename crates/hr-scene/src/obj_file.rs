@@ -10,12 +10,13 @@
 //! they are, not for polygons.
 
 mod mtl;
-mod polygon;
 #[cfg(test)]
 mod tests;
 
 use crate::mesh::{Face, MAX_SURFACES, Part, Vertices, merge, place};
+use crate::polygon::{Piece, pieces};
 use crate::warnings::Warnings;
+use crate::whole_file;
 use crate::{Primaries, Scene, SceneError};
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use glossy_ext::Rgb;
@@ -31,8 +32,7 @@ use std::str::SplitWhitespace;
 /// is wrong, [`SceneError::Empty`] where it has no polygon. Missing libraries, materials and images are only warned
 /// of; grey stands in for a missing material.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
-    from_bytes(&bytes, path)
+    from_bytes(&whole_file::read_whole(path)?, path)
 }
 
 /// As [`load`], for a file's contents; `path` is where other files are looked for, and its name.
@@ -193,7 +193,7 @@ impl<'a> Reader<'a> {
                 let whole = base.join(rest);
                 let files = if whole.is_file() { vec![whole] } else { words.map(|name| base.join(name)).collect() };
                 for file in files {
-                    match std::fs::read(&file) {
+                    match whole_file::read(&file) {
                         Ok(bytes) => self.library.read(&bytes, &file, warnings)?,
                         Err(e) => warnings
                             .add(format!("material library '{}' cannot be read: {e}", file.display()), || {
@@ -260,17 +260,17 @@ impl<'a> Reader<'a> {
         if has_colors {
             group.vertices.colors.extend(corners.iter().filter_map(|c| self.colors[of(c[0])]));
         }
-        if points.len() == 4 && polygon::is_planar_convex(&points) {
-            group.quads.push(Face { corners: [first, first + 1, first + 2, first + 3] });
-            return Ok(());
-        }
-        let triangles = polygon::triangles(&points);
-        group.triangles.extend(triangles.iter().map(|t| t.map(|i| first + i)));
-        if triangles.len() != points.len() - 2 {
-            warnings.add(
-                "part of a polygon is left out: it crosses itself, or is not convex and has more than 256 corners",
-                || self.place(line),
-            );
+        let vertex = |corner: usize| first + corner as u32;
+        match pieces(&points, &[]) {
+            Ok(pieces) => {
+                for piece in pieces {
+                    match piece {
+                        Piece::Triangle(corners) => group.triangles.push(corners.map(vertex)),
+                        Piece::Quad(corners) => group.quads.push(Face { corners: corners.map(vertex) }),
+                    }
+                }
+            }
+            Err(error) => warnings.add(format!("face with {error}: left out"), || self.place(line)),
         }
         Ok(())
     }

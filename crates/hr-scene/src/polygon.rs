@@ -361,6 +361,12 @@ mod tests {
         let dart = polygon(&[[0.0, 0.0], [4.0, 0.0], [1.0, 1.0], [0.0, 4.0]]);
         let two = pieces(&dart, &[]).expect("a dart");
         assert_eq!((two.len(), area(&dart, 4, &two)), (2, 4.0), "two triangles: {two:?}");
+        let tooth = |i: u8| [[2.0 * f64::from(i) + 2.0, 5.0], [2.0 * f64::from(i) + 1.0, 1.0]];
+        let comb: Vec<_> = [[0.0, 0.0], [16.0, 0.0]].into_iter().chain((0..8).rev().flat_map(tooth)).collect();
+        let comb = placed(&polygon(&[comb, vec![[0.0, 5.0]]].concat()), 1.0, 0.0);
+        let teeth = pieces(&comb, &[]).expect("a comb");
+        // A spine of 16 × 1; on it a half tooth at each end and seven whole ones, 2 wide and 4 high.
+        assert!((area(&comb, comb.len(), &teeth) - 48.0).abs() < 1e-9, "a comb of eight gaps: {teeth:?}");
     }
 
     #[test]
@@ -403,6 +409,10 @@ mod tests {
         assert_eq!(pieces(&p, &[]), Err(PolygonError::NotFinite), "differences overflow");
         let p = polygon(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [1.0, -1.0], [0.0, 4.0]]);
         assert_eq!(pieces(&p, &[]), Err(PolygonError::Crossing), "crossing itself");
+        let bow = polygon(&[[0.0, 0.0], [1.0, 0.0], [0.0, 2.0], [2.0, 1.0]]);
+        assert_eq!(pieces(&bow, &[]), Err(PolygonError::Crossing), "a quadrilateral whose corners are out of order");
+        let zigzag: Vec<_> = (0..200).map(|i| [f64::from(i * 37 % 101), f64::from(i * 59 % 103)]).collect();
+        assert_eq!(pieces(&polygon(&zigzag), &[]), Err(PolygonError::Crossing), "crossing itself everywhere");
         let square = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
         let across = [[3.0, 1.0], [5.0, 1.0], [5.0, 2.0], [3.0, 2.0]];
         let outside = across.map(|[x, y]| [x + 3.0, y]);

@@ -1,10 +1,46 @@
-//! Files that are written whole or not at all.
+//! Files: read whole, and written whole or not at all.
 
 use crate::SceneError;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// The contents of a regular file; others might never end.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("not a regular file"));
+    }
+    fs::read(path)
+}
+
+/// As [`read`], with an error that names the file.
+pub(crate) fn read_whole(path: &Path) -> Result<Vec<u8>, SceneError> {
+    read(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })
+}
+
+/// Temporary files that are neither renamed nor removed yet.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes what is half written, for a program that is about to end in the middle of its work. As long as the result
+/// lives, no file is begun or finished.
+pub fn abandon() -> Abandoned {
+    let list = unfinished();
+    for path in &*list {
+        // What cannot be removed stays; the program has no time left to tell.
+        let _ = fs::remove_file(path);
+    }
+    Abandoned(list)
+}
+
+/// See [`abandon`].
+#[must_use]
+pub struct Abandoned(#[expect(dead_code, reason = "it is there to be held")] MutexGuard<'static, Vec<PathBuf>>);
 
 /// Writes a file through a temporary one in the same folder, renamed when it is complete, so that nobody ever sees
 /// half a file and an older one survives a failure. A symbolic link keeps pointing where it did. Where `path` is no
@@ -35,7 +71,7 @@ fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>)
     fill(&mut out)?;
     // Data first, name after: a crash in between must not leave an empty file under the final name.
     out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-    fs::rename(&partial.0, &place)
+    partial.finish(&place)
 }
 
 /// A temporary file that goes away unless it is renamed: its name is free then, and there is nothing to remove.
@@ -54,19 +90,31 @@ impl Partial {
             hidden.push(name);
             hidden.push(format!(".{}-{number}.partial", std::process::id()));
             let path = place.with_file_name(hidden);
+            let mut list = unfinished();
             match File::create_new(&path) {
-                Ok(file) => return Ok((file, Self(path))),
+                Ok(file) => {
+                    list.push(path.clone());
+                    return Ok((file, Self(path)));
+                }
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(e) => return Err(e),
             }
         }
     }
+
+    /// Gives it its name.
+    fn finish(self, place: &Path) -> io::Result<()> {
+        let _held = unfinished();
+        fs::rename(&self.0, place)
+    }
 }
 
 impl Drop for Partial {
     fn drop(&mut self) {
+        let mut list = unfinished();
         // Already failing; the first error is the one to report.
         let _ = fs::remove_file(&self.0);
+        list.retain(|path| *path != self.0);
     }
 }
 
@@ -100,6 +148,20 @@ mod tests {
             write_whole(&path, |out| out.write_all(b"x")).expect_err("cannot be written");
         }
         assert!(folder.names().is_empty(), "nothing is left");
+    }
+
+    #[test]
+    fn only_regular_files_are_read() {
+        let folder = Folder::new("whole-file-read");
+        let path = folder.path("a.bin");
+        write_whole(&path, |out| out.write_all(b"all")).expect("written");
+        assert_eq!(read_whole(&path).expect("there"), b"all", "its contents");
+        let error = read_whole(&folder.path("")).expect_err("a folder").to_string();
+        assert!(error.ends_with("not a regular file"), "'{error}'");
+        if cfg!(unix) {
+            let error = read(Path::new("/dev/zero")).expect_err("it has no end").to_string();
+            assert_eq!(error, "not a regular file", "refused at once");
+        }
     }
 
     #[cfg(unix)]

@@ -1,10 +1,11 @@
 //! The program: load, solve, show.
 
 use crate::ViewError;
-use crate::args::{self, Args};
+use crate::args::Args;
+use crate::glossy::Mode;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
-use crate::raycast::{Mode, RayCaster};
+use crate::raycast::RayCaster;
 use crate::solved::Solved;
 use crate::stats::{Times, stats};
 use crate::walkthrough::Walkthrough;
@@ -76,7 +77,6 @@ fn make_folder(folder: &Path) -> Result<(), SceneError> {
 /// What there is to show, and how.
 struct Show<'a> {
     args: &'a Args,
-    mode: Mode,
     solved: Solved,
     /// Relative error that the solution is believed to have.
     error: f32,
@@ -92,11 +92,6 @@ struct Show<'a> {
 /// Anything that keeps it from being done; the text is one line for the user.
 pub fn run(args: &Args) -> Result<(), ViewError> {
     let output = Output::of(args)?;
-    let mode = match args.mode {
-        args::Mode::Distributions => Mode::Distributions,
-        args::Mode::Samples => Mode::Samples,
-        args::Mode::Gather => return Err(ViewError::Arguments(args::GATHER_IS_MISSING.into())),
-    };
     let progress = Progress::new();
     if let Some(threads) = args.threads {
         // For all of the process: the window's thread cannot be one of a pool of its own.
@@ -107,10 +102,10 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
     let loaded = progress.elapsed();
     // The window shows mirrors by their distributions in any mode.
     let mirrors = scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
-    let distributions = mode == Mode::Distributions || mirrors && matches!(output, Output::Window);
+    let distributions = args.mode == Mode::Distributions || mirrors && matches!(output, Output::Window);
     let (solved, error) = solve(scene, args, distributions, &progress)?;
     let begin = progress.elapsed();
-    let show = Show { args, mode, solved, error, progress: &progress, loaded, begin };
+    let show = Show { args, solved, error, progress: &progress, loaded, begin };
     match output {
         Output::Window => show.window(),
         Output::Image(path) => show.image(&path),
@@ -169,7 +164,7 @@ impl Show<'_> {
     /// A window, or frames where none can be opened.
     fn window(&self) -> Result<(), ViewError> {
         self.progress.at("making triangles", 0.0);
-        let walkthrough = Walkthrough::new(&self.solved, self.mode);
+        let walkthrough = Walkthrough::new(&self.solved, self.args.mode);
         // Before the window opens: how long somebody looks is not the program's time.
         self.write_stats()?;
         self.progress.clear();
@@ -219,7 +214,7 @@ impl Show<'_> {
     }
 
     fn caster(&self) -> RayCaster<'_> {
-        RayCaster::new(&self.solved.scene, &self.solved.solution, self.mode)
+        RayCaster::new(&self.solved.scene, &self.solved.solution, self.args.mode)
     }
 
     /// What `--stats` asks for, up to now.

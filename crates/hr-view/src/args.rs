@@ -1,6 +1,8 @@
 //! The command line.
 
 use crate::ViewError;
+use crate::glossy::Mode;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Parser, ValueEnum};
 use std::ffi::OsString;
@@ -33,7 +35,7 @@ pub struct Args {
     pub frames: Option<PathBuf>,
 
     /// How glossy light is shown
-    #[arg(long, value_name = "M", value_enum, default_value_t)]
+    #[arg(long, value_name = "M", value_enum, value_parser = mode(), default_value_t)]
     pub mode: Mode,
 
     /// The accuracy asked for: relative error of the solution, 0.001 to 1
@@ -65,22 +67,6 @@ pub struct Args {
     pub html: Option<PathBuf>,
 }
 
-/// How glossy light comes into images, frames and the window.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Mode {
-    /// evaluate the outgoing distributions (the paper's walkthrough)
-    #[default]
-    Distributions,
-    /// reflect the incident samples at each pixel (in the window: at each vertex)
-    Samples,
-    /// final gather at each pixel, for stills (not available yet)
-    Gather,
-}
-
-/// What is said to `--mode gather`.
-pub(crate) const GATHER_IS_MISSING: &str =
-    "--mode gather is not available yet; use --mode samples or --mode distributions";
-
 /// What came of reading the command line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Parsed {
@@ -107,9 +93,6 @@ impl Args {
         if let Some((option, _)) = later.iter().find(|(_, value)| value.is_some()) {
             return Err(ViewError::Arguments(format!("{option} is not available yet; use --image or --frames")));
         }
-        if args.mode == Mode::Gather {
-            return Err(ViewError::Arguments(GATHER_IS_MISSING.into()));
-        }
         Ok(Parsed::Run(Box::new(args)))
     }
 }
@@ -123,6 +106,14 @@ fn one_line(error: &clap::Error) -> String {
     // A list of what is missing follows a colon, tips and possible values follow what they are about.
     let joined = kept.join("; ").replace(":; ", ": ");
     format!("{joined}; hr-view --help lists the options")
+}
+
+/// Takes a [`Mode`], and tells that there is to be another one.
+fn mode() -> impl TypedValueParser<Value = Mode> {
+    let gather = PossibleValue::new("gather").help("final gather at each pixel, for stills (not available yet)");
+    let modes = Mode::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+    PossibleValuesParser::new(modes.chain([gather]))
+        .try_map(|name| Mode::from_str(&name, false).map_err(|_| "not available yet; use samples or distributions"))
 }
 
 fn error(text: &str) -> Result<f32, String> {

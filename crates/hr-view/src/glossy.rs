@@ -1,6 +1,7 @@
 //! Glossy radiance toward an eye, as window and ray caster share it: from the outgoing distributions of leaves, or
 //! by reflecting the illumination samples that arrive.
 
+use clap::ValueEnum;
 use glam::Vec3;
 use glossy_ext::{GlossyField, Incident, Place, Reflector, arriving};
 use hr_diffuse::{LightField, NodeId, Rgb, Solution};
@@ -8,6 +9,16 @@ use std::f32::consts::FRAC_1_PI;
 
 /// Cosine below which a curved leaf's intensity per area is no longer divided by it: both vanish toward the horizon.
 const LEAST_COSINE: f32 = 0.05;
+
+/// Where glossy light comes from, in images, frames and the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Mode {
+    /// evaluate the outgoing distributions (the paper's walkthrough, section 5)
+    #[default]
+    Distributions,
+    /// reflect the incident samples at each pixel, in the window at each vertex (section 3.4)
+    Samples,
+}
 
 /// Radiance (W/(m² sr)) from a leaf's distribution in the unit direction `away`, without the diffuse part.
 #[must_use]

@@ -1,5 +1,6 @@
-//! Ctrl-C: the first one stops refining and shows what there is, the next one ends the program.
+//! Ctrl-C: the first one stops refining and shows what there is, the next one ends the program. No half file is left.
 
+use hr_scene::whole_file::abandon;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -28,6 +29,7 @@ impl Interrupt {
             // Handlers are for the whole process; another one's is left in place.
             drop(ctrlc::try_set_handler(|| {
                 if STATE.compare_exchange(STOPS, STOPPED, Ordering::SeqCst, Ordering::SeqCst).is_err() {
+                    let _held = abandon();
                     std::process::exit(STATUS);
                 }
             }));

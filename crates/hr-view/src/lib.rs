@@ -14,8 +14,9 @@ pub mod stats;
 pub mod walkthrough;
 pub mod window;
 
-pub use args::{Args, Mode, Parsed};
+pub use args::{Args, Parsed};
 pub use error::ViewError;
+pub use glossy::Mode;
 
 use std::ffi::OsString;
 use std::io::Write;

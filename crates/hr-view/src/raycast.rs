@@ -1,9 +1,9 @@
 //! The CPU ray caster: an image of a solution without a GPU.
 //!
 //! Every pixel sends a few rays; where one meets a surface, the diffuse light comes from the irradiance at the
-//! vertices, and the glossy part from one of two sources ([`Mode`]).
+//! vertices, and the glossy part as the [`Mode`] says.
 
-use crate::glossy;
+use crate::glossy::{self, Mode};
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::{GlossyField, Incident, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
@@ -25,17 +25,6 @@ const NARROWEST: f32 = 0.03;
 const MOST_BOUNCES: u32 = 4;
 /// Rays start this far from their surface (unit space): what rounding needs.
 const START: f32 = 1e-6;
-
-/// Where the glossy part of a pixel comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Mode {
-    /// The outgoing distributions of the leaves around, interpolated: what the window shows (paper, section 5).
-    #[default]
-    Distributions,
-    /// The leaf's illumination samples, reflected at the pixel (paper, section 3.4); lobes that are too narrow for
-    /// them are followed by rays.
-    Samples,
-}
 
 /// Renders a solution.
 #[derive(Debug)]

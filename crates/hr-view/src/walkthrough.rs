@@ -2,8 +2,7 @@
 
 use crate::display::{DisplayMesh, Walkable};
 use crate::facets::{Source, facets};
-use crate::glossy;
-use crate::raycast::Mode;
+use crate::glossy::{self, Mode};
 use crate::solved::Solved;
 use glam::{DVec3, Vec3};
 use glossy_ext::{Incident, Place};

@@ -1,8 +1,8 @@
 //! The command as the shell sees it: mistakes are status 1 and one line.
 
 use std::path::PathBuf;
-use std::process::{Command, Output};
-use std::time::Instant;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 fn hr_view(arguments: &[&str]) -> Output {
     command(arguments).output().expect("the command runs")
@@ -202,4 +202,32 @@ fn without_a_display_frames_are_written() {
         frames += 1;
     }
     assert_eq!(frames, 60, "frames along the walk");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_between_frames_ends_at_once_and_leaves_whole_files() {
+    let folder = Folder::new("interrupted");
+    let mut command = command(&["furnace", "--error", "0.5", "--frames", &folder.path("frames")]);
+    let mut running = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command runs");
+    let names = || -> Vec<String> {
+        let Ok(entries) = std::fs::read_dir(folder.path("frames")) else { return Vec::new() };
+        entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
+    };
+    while !names().iter().any(|name| name.starts_with("frame")) {
+        assert!(running.try_wait().expect("it is ours").is_none(), "there are frames before it ends");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let pressed = Command::new("kill").args(["-INT", &running.id().to_string()]).status().expect("kill is there");
+    assert!(pressed.success(), "it was still running");
+    let begin = Instant::now();
+    let status = running.wait().expect("it ends");
+    assert_eq!(status.code(), Some(130), "the status of an interrupted program");
+    assert!(begin.elapsed() < Duration::from_secs(5), "it ends soon, after {:?}", begin.elapsed());
+    let names = names();
+    assert!(!names.is_empty() && names.len() < 60, "some frames were done: {}", names.len());
+    for name in &names {
+        assert!(name.starts_with("frame"), "nothing else is left: {name}");
+        image::open(folder.path("frames") + "/" + name).expect("a whole PNG file");
+    }
 }

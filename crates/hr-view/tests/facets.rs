@@ -3,8 +3,9 @@
 use glam::{DVec3, Vec3};
 use hr_diffuse::{Settings, Shape, Surface};
 use hr_scene::{Camera, Rgb, Scene, ToneMap};
+use hr_view::Mode;
 use hr_view::display::{DisplayMesh, Walkable};
-use hr_view::raycast::{Mode, RayCaster};
+use hr_view::raycast::RayCaster;
 use hr_view::solved::Solved;
 use hr_view::walkthrough::Walkthrough;
 use hr_view::window::{Snapshot, WindowError};

@@ -1,6 +1,7 @@
 //! From bytes to a checked document with its buffers, and typed errors for whatever is wrong on the way.
 
 use crate::SceneError;
+use crate::whole_file::read_whole;
 use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{self, Root};
 use std::path::{Path, PathBuf};
@@ -151,7 +152,7 @@ impl Document {
                 self.wrong(place, format!("'{uri}' is no relative file name"), "embed the data or lay the file beside")
             })?;
         let path = self.path.parent().unwrap_or(Path::new("")).join(relative);
-        std::fs::read(&path).map_err(|source| SceneError::Io { path, source })
+        read_whole(&path)
     }
 
     /// The bytes of a buffer view.

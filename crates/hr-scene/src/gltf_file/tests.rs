@@ -1,4 +1,5 @@
 use super::*;
+use crate::testing::Folder;
 use crate::texture::Wrap;
 use hr_diffuse::Shape;
 use proptest::prelude::*;
@@ -192,22 +193,20 @@ fn json_files_with_data_uris_and_with_files_give_the_same() {
     let glb = b.scene();
     let embedded = from_bytes(&b.json(true), Path::new("small.gltf")).expect("valid");
     assert_eq!(embedded.surfaces, glb.surfaces, "data URI");
-    let folder = std::env::temp_dir().join(format!("hr-scene-gltf-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let folder = Folder::new("gltf");
     let mut document: Value = serde_json::from_slice(&b.json(false)).expect("JSON");
     document["buffers"][0]["uri"] = json!("the%20data.bin");
     document["images"] = json!([{"uri": "texture.png"}]);
-    std::fs::write(folder.join("the data.bin"), &b.data).expect("written");
-    std::fs::write(folder.join("texture.png"), png(1, 1, |_, _| [255, 255, 0])).expect("written");
-    std::fs::write(folder.join("a.gltf"), document.to_string()).expect("written");
-    let scene = load(&folder.join("a.gltf")).expect("valid");
+    std::fs::write(folder.path("the data.bin"), &b.data).expect("written");
+    std::fs::write(folder.path("texture.png"), png(1, 1, |_, _| [255, 255, 0])).expect("written");
+    std::fs::write(folder.path("a.gltf"), document.to_string()).expect("written");
+    let scene = load(&folder.path("a.gltf")).expect("valid");
     assert_eq!(scene.surfaces, glb.surfaces, "external buffer");
     assert!(close(scene.base_color(0, 0.5, 0.5).expect("textured"), [0.5, 1.0, 0.0]), "external image");
     document["buffers"][0]["uri"] = json!("missing.bin");
-    std::fs::write(folder.join("a.gltf"), document.to_string()).expect("written");
-    let error = load(&folder.join("a.gltf")).expect_err("a file is missing").to_string();
+    std::fs::write(folder.path("a.gltf"), document.to_string()).expect("written");
+    let error = load(&folder.path("a.gltf")).expect_err("a file is missing").to_string();
     assert!(error.contains("missing.bin"), "{error}");
-    std::fs::remove_dir_all(&folder).expect("removed");
 }
 
 #[test]

@@ -30,9 +30,9 @@ mod tests;
 
 pub use reader::Include;
 
+use crate::whole_file;
 use crate::{Scene, SceneError};
 use std::path::Path;
-use std::{fs, io};
 
 /// Reads an MGF file and the files that it includes.
 ///
@@ -40,8 +40,7 @@ use std::{fs, io};
 /// [`SceneError::Io`] where the file cannot be read; [`SceneError::Syntax`], with file and line, where a statement
 /// makes no sense or an include cannot be read.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    let bytes = read_file(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
-    read(path, &bytes, &read_file)
+    read(path, &whole_file::read_whole(path)?, &whole_file::read)
 }
 
 /// Reads MGF from memory. `path` is its name in messages; includes are sought with `include`, by a path relative to
@@ -58,12 +57,4 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 /// [`SceneError::Syntax`], with file and line, where a statement makes no sense or an include cannot be read.
 pub fn read(path: &Path, bytes: &[u8], include: Include) -> Result<Scene, SceneError> {
     reader::read(path, bytes, include)
-}
-
-/// The contents of a regular file; others might never end.
-fn read_file(path: &Path) -> io::Result<Vec<u8>> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("not a regular file"));
-    }
-    fs::read(path)
 }

@@ -198,7 +198,7 @@ fn texture(rest: &str, path: &Path, place: impl Fn() -> String, warnings: &mut W
         rest = tail;
     }
     let file = path.parent().unwrap_or(Path::new("")).join(rest.replace('\\', "/"));
-    let decoded = std::fs::read(&file).map_err(|e| e.to_string()).and_then(|bytes| decode(&bytes, true));
+    let decoded = crate::whole_file::read(&file).map_err(|e| e.to_string()).and_then(|bytes| decode(&bytes, true));
     match decoded {
         Ok((texels, halved)) => {
             if halved {

@@ -1,36 +1,19 @@
 use super::*;
+use crate::testing::Folder;
 use hr_diffuse::Shape;
 use proptest::prelude::*;
 use std::path::PathBuf;
 
-/// A folder of its own for each test, gone with its value.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("hr-scene-obj-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("a folder");
-        Self(path)
-    }
-
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.join(name);
-        std::fs::write(&path, bytes).expect("written");
-        path
-    }
-
-    /// A file of one square with a library of one material 'm'.
-    fn with_material(&self, statements: &str) -> Result<Scene, SceneError> {
-        self.write("a.mtl", format!("newmtl m\n{statements}"));
-        load(&self.write("a.obj", format!("mtllib a.mtl\nusemtl m\n{SQUARE}f 1/1 2/2 3/3 4/4\n")))
-    }
+fn write(folder: &Folder, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+    let path = folder.path(name);
+    std::fs::write(&path, bytes).expect("written");
+    path
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // Left behind in the temporary folder at worst.
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
+/// A file of one square with a library of one material 'm'.
+fn with_material(folder: &Folder, statements: &str) -> Result<Scene, SceneError> {
+    write(folder, "a.mtl", format!("newmtl m\n{statements}"));
+    load(&write(folder, "a.obj", format!("mtllib a.mtl\nusemtl m\n{SQUARE}f 1/1 2/2 3/3 4/4\n")))
 }
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
@@ -68,8 +51,9 @@ fn quadrilaterals_stay_and_triangle_pairs_merge() {
 }
 
 #[test]
-fn polygons_fall_into_triangles() {
+fn polygons_fall_into_pieces() {
     let scene = parse("v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5 6\n");
+    assert_eq!(scene.surfaces.len(), 2, "an L is two quadrilaterals");
     let area: f64 = (scene.surfaces.iter())
         .map(|s| match &s.shape {
             Shape::Triangle([a, b, c]) => 0.5 * (*b - *a).cross(*c - *a).z,
@@ -79,7 +63,8 @@ fn polygons_fall_into_triangles() {
         .sum();
     assert!((area - 3.0).abs() < 1e-12, "the area of the L: {area}");
     let crossed = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 2 0\nv 0 2 0\nv 5 1 0\nf 1 2 3 4 5 6\nf 1 2 3\n");
-    assert!(!crossed.surfaces.is_empty(), "crossed polygons do not stop the rest");
+    assert_eq!(crossed.surfaces.len(), 1, "crossed polygons do not stop the rest");
+    assert!(warned(&crossed, "crosses itself"), "they are told of: {:?}", crossed.warnings);
 }
 
 #[test]
@@ -104,8 +89,8 @@ fn normals_and_colours() {
 
 #[test]
 fn materials() {
-    let folder = Folder::new("materials");
-    let material = |statements: &str| folder.with_material(statements).expect("valid").materials.remove(0);
+    let folder = Folder::new("obj-materials");
+    let material = |statements: &str| with_material(&folder, statements).expect("valid").materials.remove(0);
     let plain = material("Kd 0.2 0.4 0.6\nKe 1 2 3\nNs 20\nKs 0.1 0.1 0.1\n");
     assert_eq!((plain.name.as_str(), plain.base_color), ("m", Rgb::new(0.2, 0.4, 0.6)), "Kd");
     let pi = std::f32::consts::PI;
@@ -114,38 +99,39 @@ fn materials() {
     assert_eq!(material("Kd 0.3\n").base_color, Rgb::splat(0.3), "one number is grey");
     let metal = material("Kd 0.9 0.8 0.1\nPm 1\nPr 0.2\n");
     assert_eq!(metal.reflector.diffuse(), Rgb::ZERO, "a metal has no diffuse part");
-    let bright = folder.with_material("Kd 1 0.5 0\nKs 1 1 1\nNs 10\n").expect("valid");
+    let bright = with_material(&folder, "Kd 1 0.5 0\nKs 1 1 1\nNs 10\n").expect("valid");
     assert!(warned(&bright, "Kd + Ks"), "{:?}", bright.warnings);
     assert!(close(bright.materials[0].base_color, [0.5, 0.25, 0.0]), "scaled to 1");
-    let matte = folder.with_material("Kd 1 0.5 0\nKs 1 1 1\nillum 1\n").expect("valid");
+    let matte = with_material(&folder, "Kd 1 0.5 0\nKs 1 1 1\nillum 1\n").expect("valid");
     assert!(close(matte.materials[0].base_color, [1.0, 0.5, 0.0]), "no highlight in model 1");
-    let odd = folder.with_material("Kd spectral a.rfl\nd 0.5\nmap_Bump x.png\nKe nan -1 inf\n").expect("valid");
+    let odd = with_material(&folder, "Kd spectral a.rfl\nd 0.5\nmap_Bump x.png\nKe nan -1 inf\n").expect("valid");
     assert!(warned(&odd, "spectral") && warned(&odd, "transparency") && warned(&odd, "map_Bump"), "{:?}", odd.warnings);
     assert_eq!(odd.materials[0].exitance, Rgb::ZERO, "only numbers shine");
-    let error = folder.with_material("Kd 0.1 0.2 x\n").expect_err("no number").to_string();
+    let error = with_material(&folder, "Kd 0.1 0.2 x\n").expect_err("no number").to_string();
     assert!(error.contains("a.mtl:2: 'x' is no number"), "{error}");
 }
 
 #[test]
 fn textures() {
-    let folder = Folder::new("textures");
+    let folder = Folder::new("obj-textures");
     // Black, red / green, blue from the upper left.
     let texel = |x: u32, y: u32| [[[0, 0, 0], [255, 0, 0]], [[0, 255, 0], [0, 0, 255]]][y as usize][x as usize];
     let image = image::RgbImage::from_fn(2, 2, |x, y| image::Rgb(texel(x, y)));
     let mut png = std::io::Cursor::new(Vec::new());
     image.write_to(&mut png, image::ImageFormat::Png).expect("written");
-    folder.write("a texture.png", png.into_inner());
-    let scene = folder.with_material("Kd 0.5 1 1\nmap_Kd a texture.png\n").expect("valid");
+    write(&folder, "a texture.png", png.into_inner());
+    let scene = with_material(&folder, "Kd 0.5 1 1\nmap_Kd a texture.png\n").expect("valid");
     let at = |scene: &Scene, u, v| scene.base_color(0, u, v).expect("textured");
     assert!(close(at(&scene, 0.25, 0.25), [0.0, 1.0, 0.0]), "lower left is green: v goes up");
     assert!(close(at(&scene, 0.75, 0.75), [0.5, 0.0, 0.0]), "upper right is red");
     let mean = scene.materials[0].reflector.diffuse();
     assert!(close(mean, [0.125, 0.25, 0.25]), "the mean colour reflects: {mean}");
-    let moved = folder.with_material("Kd 1 1 1\nmap_Kd -s 1 1 1 -o 0 0.5 0 -clamp on a texture.png\n").expect("valid");
+    let moved =
+        with_material(&folder, "Kd 1 1 1\nmap_Kd -s 1 1 1 -o 0 0.5 0 -clamp on a texture.png\n").expect("valid");
     // v + ½ of the lower left is the upper left.
     assert!(close(at(&moved, 0.25, 0.25), [0.0; 3]), "moved: {}", at(&moved, 0.25, 0.25));
     assert!(close(at(&moved, 0.75, 0.9), [1.0, 0.0, 0.0]), "clamped at the top");
-    let missing = folder.with_material("Kd 1 1 1\nmap_Kd missing.png\n").expect("valid");
+    let missing = with_material(&folder, "Kd 1 1 1\nmap_Kd missing.png\n").expect("valid");
     assert!(warned(&missing, "missing.png") && missing.attributes.is_empty(), "only warned of");
 }
 

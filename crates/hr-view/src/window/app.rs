@@ -325,7 +325,8 @@ impl<'a> Live<'a> {
     fn drag(&mut self, position: PhysicalPosition<f64>) {
         let last = self.cursor.replace(position);
         if let (Mouse::Dragging, Some(last)) = (self.mouse, last) {
-            let turn = self.walker.view.fov_x.to_radians() / f64::from(self.config.width.max(1));
+            let [width, height] = [self.config.width, self.config.height].map(|side| f64::from(side.max(1)));
+            let turn = self.walker.view.breadth(width / height) / width;
             self.walker.turn((position.x - last.x) * turn, (last.y - position.y) * turn);
             self.window.request_redraw();
         }

@@ -48,7 +48,7 @@ pub(super) struct Settings {
     pub(super) stops: f32,
     /// Change of direction in degrees that a glossy vertex is evaluated again for.
     pub(super) tolerance: f32,
-    /// Horizontal field of view in degrees.
+    /// Horizontal field of view in degrees of a camera's own picture.
     pub(super) fov_x: f64,
 }
 

@@ -179,7 +179,7 @@ mod tests {
 
     fn update(refresh: &mut Refresh, square: &Square, eye: DVec3, target: DVec3, tolerance: f32) -> Refreshed {
         let [_, list] = split(square.mesh());
-        let view = View::looking(eye, target - eye, DVec3::Y, 90.0);
+        let view = View::looking(eye, target - eye, DVec3::Y, 90.0, 1.0);
         refresh.update(square, &list, eye, &view.sight(DVec3::ZERO, 1.0), tolerance)
     }
 

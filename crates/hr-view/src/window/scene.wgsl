@@ -36,27 +36,22 @@ fn project(point: vec3f) -> vec4f {
     return vec4f(x, y, frame.forward.w, dot(to, frame.forward.xyz));
 }
 
-@vertex
-fn diffuse_vertex(
+struct Vertex {
     @location(0) point: vec3f,
     @location(1) irradiance: vec3f,
     @location(2) tint: vec3f,
     @location(3) emission: vec3f,
     @location(4) uv: vec2f,
-) -> Fragment {
-    return Fragment(project(point), irradiance, tint, emission, uv);
 }
 
 @vertex
-fn glossy_vertex(
-    @location(0) point: vec3f,
-    @location(1) irradiance: vec3f,
-    @location(2) tint: vec3f,
-    @location(3) emission: vec3f,
-    @location(4) uv: vec2f,
-    @location(5) glossy: vec3f,
-) -> Fragment {
-    return Fragment(project(point), irradiance, tint, emission + glossy, uv);
+fn diffuse_vertex(v: Vertex) -> Fragment {
+    return Fragment(project(v.point), v.irradiance, v.tint, v.emission, v.uv);
+}
+
+@vertex
+fn glossy_vertex(v: Vertex, @location(5) glossy: vec3f) -> Fragment {
+    return Fragment(project(v.point), v.irradiance, v.tint, v.emission + glossy, v.uv);
 }
 
 fn curve(x: vec3f) -> vec3f {

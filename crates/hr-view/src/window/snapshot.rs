@@ -8,7 +8,10 @@ use super::scene_buffers::{Frame, Pass, SceneBuffers};
 use super::tone::Tone;
 use super::view::View;
 use crate::display::Walkable;
-use hr_scene::Camera;
+use hr_scene::whole_file::write_whole;
+use hr_scene::{Camera, SceneError};
+use image::ImageEncoder;
+use std::io;
 use std::path::Path;
 
 /// An 8-bit sRGB picture.
@@ -111,20 +114,22 @@ impl Snapshot {
         Ok(Self { width, height, rgba })
     }
 
-    /// Writes a PNG file.
+    /// Writes a PNG file, whole or not at all.
     ///
     /// # Errors
     /// [`WindowError::Save`] where it cannot be written.
     pub fn save_png(&self, path: &Path) -> Result<(), WindowError> {
-        let format = image::ImageFormat::Png;
-        image::save_buffer_with_format(
-            path,
-            &self.rgba,
-            self.width,
-            self.height,
-            image::ExtendedColorType::Rgba8,
-            format,
-        )
-        .map_err(|error| WindowError::Save { path: path.to_path_buf(), reason: one_line(&error) })
+        let written = write_whole(path, |out| {
+            let encoder = image::codecs::png::PngEncoder::new(out);
+            let done = encoder.write_image(&self.rgba, self.width, self.height, image::ExtendedColorType::Rgba8);
+            done.map_err(io::Error::other)
+        });
+        written.map_err(|error| {
+            let reason = match &error {
+                SceneError::Io { source, .. } => one_line(source),
+                other => one_line(other),
+            };
+            WindowError::Save { path: path.to_path_buf(), reason }
+        })
     }
 }

@@ -18,26 +18,30 @@ pub(super) struct View {
     pub(super) up: DVec3,
     /// Unit vector into the picture.
     pub(super) forward: DVec3,
-    /// Horizontal field of view in degrees.
+    /// Horizontal field of view in degrees of the picture that is always seen whole.
     pub(super) fov_x: f64,
+    /// Width / height of that picture. A window of another shape shows more, at the sides or above and below.
+    pub(super) shape: f64,
 }
 
 impl View {
     /// From `eye` along `forward`, with `up` roughly up; any length, and any direction where they are degenerate.
-    pub(super) fn looking(eye: DVec3, forward: DVec3, up: DVec3, fov_x: f64) -> Self {
+    /// `shape` is > 0.
+    pub(super) fn looking(eye: DVec3, forward: DVec3, up: DVec3, fov_x: f64, shape: f64) -> Self {
         let forward = forward.try_normalize().unwrap_or(DVec3::X);
         let up = up.try_normalize().unwrap_or(DVec3::Z);
         let right = forward.cross(up);
         let right = if right.length() < 1e-9 { forward.any_orthonormal_vector() } else { right.normalize() };
         let fov_x = if fov_x.is_finite() { fov_x.clamp(1.0, 170.0) } else { 60.0 };
         let eye = if eye.is_finite() { eye } else { DVec3::ZERO };
-        Self { eye, right, up: right.cross(forward), forward, fov_x }
+        Self { eye, right, up: right.cross(forward), forward, fov_x, shape }
     }
 
     /// What a camera shows.
     pub(super) fn of_camera(camera: &Camera) -> Self {
         let (eye, target) = (DVec3::from(camera.eye), DVec3::from(camera.target));
-        Self::looking(eye, target - eye, camera.up.into(), camera.fov_x)
+        let shape = f64::from(camera.width.max(1)) / f64::from(camera.height.max(1));
+        Self::looking(eye, target - eye, camera.up.into(), camera.fov_x, shape)
     }
 
     /// From outside at a box with these corners, the whole of it in the picture.
@@ -46,8 +50,8 @@ impl View {
         let from = (aside * 2.0 + up.cross(aside) + up).normalize();
         let center = 0.5 * (low + high);
         let radius = (0.5 * (high - low).length()).max(f64::MIN_POSITIVE);
-        // 45° across is 26° high in a 16:9 window; a sphere at 4.5 radii takes 25.7°.
-        Self::looking(center + from * (4.5 * radius), -from, up, 45.0)
+        // A sphere at 4.5 radii takes 25.7°.
+        Self::looking(center + from * (4.5 * radius), -from, up, 26.0, 1.0)
     }
 
     /// Turns by angles in radians to the right and up, about the vertical `up`; levels the horizon.
@@ -62,14 +66,19 @@ impl View {
             .unwrap_or_else(|| up.any_orthonormal_vector());
         let (sin, cos) = right.sin_cos();
         let ahead = ahead * cos + ahead.cross(up) * sin;
-        Self::looking(self.eye, ahead * pitch.cos() + up * pitch.sin(), up, self.fov_x)
+        Self::looking(self.eye, ahead * pitch.cos() + up * pitch.sin(), up, self.fov_x, self.shape)
     }
 
     /// Horizontal and vertical scale of the projection (cotangents of half the fields of view) for a picture of
     /// width / height `aspect`.
     pub(super) fn scales(&self, aspect: f64) -> [f64; 2] {
         let x = 1.0 / (0.5 * self.fov_x.to_radians()).tan();
-        [x, x * aspect]
+        if aspect > self.shape { [x * self.shape / aspect, x * self.shape] } else { [x, x * aspect] }
+    }
+
+    /// Angle in radians from the left to the right edge of a picture of width / height `aspect`.
+    pub(super) fn breadth(&self, aspect: f64) -> f64 {
+        2.0 * self.scales(aspect)[0].recip().atan()
     }
 
     /// The part of space that a picture of width / height `aspect` shows, relative to `origin`.
@@ -89,7 +98,7 @@ mod tests {
 
     #[test]
     fn sides_bound_the_field_of_view() {
-        let view = View::looking(DVec3::ZERO, DVec3::X, DVec3::Z, 90.0);
+        let view = View::looking(DVec3::ZERO, DVec3::X, DVec3::Z, 90.0, 2.0);
         let inside =
             |p: DVec3, aspect: f64| view.sight(DVec3::ZERO, aspect).sides.iter().all(|s| s.dot(p.as_vec3()) >= 0.0);
         assert!(inside(DVec3::new(1.0, 0.99, 0.0), 2.0), "just left of the right edge");
@@ -101,21 +110,50 @@ mod tests {
     }
 
     #[test]
+    fn windows_of_any_shape_show_the_whole_picture_of_a_camera() {
+        for (width, height) in [(64, 64), (30, 90), (160, 100), (200, 20)] {
+            let camera = Camera {
+                eye: [1.0, 2.0, 3.0],
+                target: [4.0, 1.0, 2.0],
+                up: [0.0, 0.0, 1.0],
+                fov_x: 50.0,
+                width,
+                height,
+            };
+            let view = View::of_camera(&camera);
+            let shape = f64::from(width) / f64::from(height);
+            for aspect in [0.2, 1.0, 1.6, 4.0, shape] {
+                let sides = view.sight(view.eye, aspect).sides;
+                // By a share of the picture inside or outside of its edge.
+                let sees = |x: f64, y: f64| {
+                    let [x, y] = [x * f64::from(width), y * f64::from(height)];
+                    sides.iter().all(|side| side.dot(camera.direction(x, y).as_vec3()) >= 0.0)
+                };
+                let what = format!("{width} × {height} in a window of {aspect}");
+                assert!(sees(0.01, 0.01) && sees(0.99, 0.99) && sees(0.99, 0.01), "{what}: all is seen");
+                assert_eq!(sees(0.5, 1.01), aspect < shape, "{what}: more above and below only in higher windows");
+                assert_eq!(sees(1.01, 0.5), aspect > shape, "{what}: more at the sides only in wider ones");
+            }
+            assert!((view.breadth(shape).to_degrees() - 50.0).abs() < 1e-9, "its own breadth in its own shape");
+        }
+    }
+
+    #[test]
     fn turning_keeps_the_horizon_and_stops_short_of_the_pole() {
-        let view = View::looking(DVec3::ZERO, DVec3::X, DVec3::new(0.0, 0.3, 1.0), 60.0);
+        let view = View::looking(DVec3::ZERO, DVec3::X, DVec3::new(0.0, 0.3, 1.0), 60.0, 1.6);
         let right = view.turned(std::f64::consts::FRAC_PI_2, 0.0, DVec3::Z);
         assert!((right.forward - DVec3::NEG_Y).length() < 1e-12, "right of x, z up, is −y: {}", right.forward);
         assert!(right.right.z.abs() < 1e-12, "the camera's roll is gone");
         let high = view.turned(0.0, 9.0, DVec3::Z);
         assert!(high.forward.z > 0.99 && high.forward.x > 0.0, "not over the top: {}", high.forward);
-        let down = View::looking(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 60.0).turned(0.0, 0.5, DVec3::Z);
+        let down = View::looking(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 60.0, 1.6).turned(0.0, 0.5, DVec3::Z);
         assert!(down.forward.y > 0.0 && down.forward.is_finite(), "from straight down, up is toward the top: {down:?}");
     }
 
     #[test]
     fn degenerate_cameras_still_see() {
         for (forward, up) in [(DVec3::ZERO, DVec3::ZERO), (DVec3::Z, DVec3::Z), (DVec3::NAN, DVec3::X)] {
-            let view = View::looking(DVec3::NAN, forward, up, f64::NAN);
+            let view = View::looking(DVec3::NAN, forward, up, f64::NAN, 1.6);
             assert!(view.right.is_finite() && view.up.is_finite() && view.eye.is_finite(), "{forward} {up}: {view:?}");
         }
     }
@@ -124,12 +162,14 @@ mod tests {
     fn the_whole_box_is_seen_from_outside() {
         let (low, high) = (DVec3::new(-3.0, 0.0, 5.0), DVec3::new(1.0, 2.0, 6.0));
         let view = View::around(low, high, DVec3::Y);
-        let sight = view.sight(DVec3::ZERO, 1.6);
-        for corner in 0..8 {
-            let pick = |bit: i32, a: f64, b: f64| if corner & bit == 0 { a } else { b };
-            let p = DVec3::new(pick(1, low.x, high.x), pick(2, low.y, high.y), pick(4, low.z, high.z));
-            let seen = sight.sides.iter().all(|s| s.dot(p.as_vec3() - sight.eye) >= 0.0);
-            assert!(seen, "corner {p} is outside the picture");
+        for aspect in [0.5, 1.6, 3.0] {
+            let sight = view.sight(DVec3::ZERO, aspect);
+            for corner in 0..8 {
+                let pick = |bit: i32, a: f64, b: f64| if corner & bit == 0 { a } else { b };
+                let p = DVec3::new(pick(1, low.x, high.x), pick(2, low.y, high.y), pick(4, low.z, high.z));
+                let seen = sight.sides.iter().all(|s| s.dot(p.as_vec3() - sight.eye) >= 0.0);
+                assert!(seen, "corner {p} is outside a picture of {aspect}");
+            }
         }
     }
 }
