@@ -10,7 +10,7 @@ use crate::hierarchy::{Element, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
 use crate::links::Links;
 use crate::rows::{Correction, Row, look_around};
-use crate::transport::Light;
+use crate::transport::{Light, NEGLIGIBLE};
 use glam::Vec3;
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
@@ -116,6 +116,7 @@ fn place_leaf<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32) -> P
         return Placed::default();
     }
     let points = sample_points(light.scene, element);
+    let negligible = NEGLIGIBLE * light.exitant.irradiance[leaf as usize].max_element();
     // By groups of classes: light at the points, light pushed down, and what would be pushed down of unit radiosity.
     let (mut exact, mut pushed, mut inherited_row) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     let mut row = Row::default();
@@ -147,7 +148,8 @@ fn place_leaf<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32) -> P
                 if class == Class::Cluster { light.element(link.sender).mean_cosine(-direction) } else { 1.0 };
             inherited_row[class.group()] += carried * pattern;
             for &(x, n, weight) in &points {
-                exact[class.group()] += visible * weight * light.irradiance_at(x, n, link.sender).element_sum();
+                exact[class.group()] +=
+                    visible * weight * light.arriving_at(x, n, link.sender, negligible).0.element_sum();
             }
         }
         if node == 0 {

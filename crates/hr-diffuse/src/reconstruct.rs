@@ -13,7 +13,7 @@ use crate::place::{Class, Gathered, Placed};
 use crate::rows::{Row, look_around};
 use crate::sampling::hash;
 use crate::segments::visibility_at;
-use crate::transport::Light;
+use crate::transport::{Light, NEGLIGIBLE};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use smallvec::SmallVec;
@@ -269,11 +269,12 @@ fn gather_at<L: LightField>(
     let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET));
     let mut arriving: SmallVec<[Arriving; 128]> = SmallVec::new();
+    let negligible = NEGLIGIBLE * light.exitant.irradiance[leaf as usize].max_element();
     let mut total = 0.0;
     let mut node = leaf;
     loop {
         for link in links.of(node) {
-            let (irradiance, share) = light.arriving_at(x, n, link.sender);
+            let (irradiance, share) = light.arriving_at(x, n, link.sender, negligible);
             let most = irradiance.max_element();
             if most > 0.0 {
                 total += most * link.visibility.abs().max(0.05);

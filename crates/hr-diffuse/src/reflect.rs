@@ -7,11 +7,13 @@ use crate::hierarchy::Elements;
 use crate::hooks::{Arrived, LightField, NodeId};
 use crate::links::Links;
 use crate::sampling::{hash, unit};
-use crate::solver::Solver;
+use crate::solver::{Phase, Progress, Solver};
 use crate::{Cone, Rgb};
+use glam::Vec2;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::f32::consts::FRAC_1_PI;
+use std::ops::ControlFlow;
 
 /// So many leaves at most stand for all that are below a sender.
 const REPRESENTATIVES: usize = 16;
@@ -218,17 +220,40 @@ impl<L: LightField> Solver<L> {
 
     /// Reflects the incident light of all leaves once more, of those too whose light no link asked for or was carried as
     /// diffuse light: the final reflection of all accumulated samples (paper, section 3.4), for display by distributions.
-    pub fn reflect_for_display(&mut self) {
+    /// Where `watch` breaks, the rest stays as it is.
+    pub fn reflect_for_display(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let start = std::time::Instant::now();
         self.last_reflected.resize(self.elements.nodes.len(), Rgb::splat(f32::NEG_INFINITY));
         let active = |leaf: &u32| self.elements.nodes[*leaf as usize].active;
-        let leaves = self.elements.patch_leaves().filter(active).map(|leaf| Standing { leaf, spread: 0.0 });
-        let leaves: Vec<Standing> = leaves.collect();
+        let leaves: Vec<Standing> = self
+            .elements
+            .patch_leaves()
+            .filter(active)
+            .map(|leaf| Standing { leaf, spread: self.bend(leaf) })
+            .collect();
         // Those that stood for others are to show their own detail now.
         for Standing { leaf, .. } in &leaves {
             self.last_reflected[*leaf as usize] = Rgb::splat(f32::NEG_INFINITY);
         }
-        self.reflect(&leaves);
+        let chunk = (leaves.len() / 40).max(256);
+        for (i, part) in leaves.chunks(chunk).enumerate() {
+            let share = (i * chunk) as f32 / leaves.len() as f32;
+            if watch(&self.progress(Phase::Transport, 0.86 + 0.04 * share, 1.0)).is_break() {
+                break;
+            }
+            self.reflect(part);
+        }
         self.stats.seconds.reflect += start.elapsed().as_secs_f64();
+    }
+
+    /// Angle by which the shading normals of a leaf's surface turn away from the surface: it is a piece of something
+    /// smooth, and detail finer than that belongs to no place on it.
+    fn bend(&self, leaf: u32) -> f32 {
+        let element = &self.elements.nodes[leaf as usize];
+        let normal = self.scene.surfaces()[element.source as usize].normal(Vec2::splat(0.25));
+        let shading = self.scene.shading_normals[element.source as usize].as_ref();
+        shading.map_or(0.0, |normals| {
+            normals.iter().map(|n| n.normalize_or(normal).dot(normal).clamp(0.0, 1.0).acos()).fold(0.0, f32::max)
+        })
     }
 }

@@ -19,14 +19,14 @@ use std::time::Instant;
 
 /// A link's tolerance is this share of the error asked for, times the mean irradiance. Chosen so that the error of
 /// the built-in scenes stays below what was asked for.
-const LINK_SHARE: f32 = 0.1;
+const LINK_SHARE: f32 = 0.085;
 /// Elements are not split below this share of the error's square root: features smaller than that are not resolved.
 const SMALLEST_SHARE: f32 = 0.008;
 /// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
 const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
 /// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
 /// diffuse light until it is shown.
-const FAINT_SHARE: f32 = 0.5;
+const FAINT_SHARE: f32 = 0.7;
 /// Iterations end when all that are to come would change the solution by less than this share of the error.
 const CONVERGED_SHARE: f32 = 0.02;
 /// The first pass that reflects the extension's light: before it, there is little light to reflect.
@@ -96,6 +96,8 @@ pub struct Solver<L: LightField = ()> {
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
     /// diffuse light.
     pub(crate) faint: Vec<Rgb>,
+    /// By material: what is reflected beside the diffuse part as directional light.
+    strong: Vec<Rgb>,
     /// Irradiance of each leaf when its light was last reflected by the extension.
     pub(crate) last_reflected: Vec<Rgb>,
     /// What links may carry of directional light: see [`columns`](crate::columns).
@@ -118,11 +120,13 @@ impl<L: LightField> Solver<L> {
             return Err(SolveError::Error { error: settings.error });
         }
         let scene = scene_data(input)?;
-        let faint = (0..scene.materials.len() as u32).map(|material| match field.active(material) {
-            Some(albedo) if albedo.max_element() <= FAINT_SHARE * settings.error => albedo,
-            _ => Rgb::ZERO,
-        });
-        let faint: Vec<Rgb> = faint.collect();
+        let (faint, strong) = (0..scene.materials.len() as u32)
+            .map(|material| match field.active(material) {
+                Some(albedo) if albedo.max_element() <= FAINT_SHARE * settings.error => (albedo, Rgb::ZERO),
+                Some(albedo) => (Rgb::ZERO, albedo),
+                None => (Rgb::ZERO, Rgb::ZERO),
+            })
+            .unzip();
         let elements = Elements::build(&scene, |material| field.active(material));
         let count = elements.nodes.len();
         let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
@@ -134,6 +138,7 @@ impl<L: LightField> Solver<L> {
                 range: vec![[Rgb::ZERO; 2]; count],
                 facing: vec![Facing::ZERO; count],
                 irradiance: vec![Rgb::ZERO; count],
+                directional: vec![Rgb::ZERO; count],
                 reflected_as: (0..count as u32).collect(),
                 peak: vec![0.0; count],
                 gain: vec![1.0; count],
@@ -150,6 +155,7 @@ impl<L: LightField> Solver<L> {
             transfers: Vec::new(),
             placed: Vec::new(),
             faint,
+            strong,
             last_reflected: Vec::new(),
             most_reflected: FREELY,
             brightest: Vec::new(),
@@ -250,10 +256,8 @@ impl<L: LightField> Solver<L> {
         self.gather();
         self.push();
         let middle = Instant::now();
-        if reflects {
-            if self.reflect_senders() {
-                self.exitant.gain = gains(self.light(), &self.links, self.most_reflected);
-            }
+        if reflects && self.reflect_senders() {
+            self.exitant.gain = gains(self.light(), &self.links, self.most_reflected);
         }
         let end = Instant::now();
         self.pull();
@@ -381,12 +385,14 @@ impl<L: LightField> Solver<L> {
                 let reflectance = element.reflectance + self.faint[element.material as usize];
                 let radiosity = emitted + exitant.irradiance[node] * reflectance;
                 exitant.radiosity[node] = radiosity;
+                exitant.directional[node] = exitant.irradiance[node] * self.strong[element.material as usize];
                 exitant.range[node] = [radiosity, radiosity];
                 exitant.facing[node] = element.facing;
                 continue;
             }
             let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
             let (mut radiosity, mut irradiance, mut area) = (Rgb::ZERO, Rgb::ZERO, 0.0);
+            let mut directional = Rgb::ZERO;
             let (mut low, mut high) = (Rgb::MAX, Rgb::ZERO);
             let (mut facing, mut weight) = (Facing::ZERO, 0.0);
             for child in range {
@@ -399,6 +405,7 @@ impl<L: LightField> Solver<L> {
                 }
                 radiosity += exitant.radiosity[child] * part.area;
                 irradiance += exitant.irradiance[child] * part.area;
+                directional += exitant.directional[child] * part.area;
                 area += part.area;
                 low = low.min(exitant.range[child][0]);
                 high = high.max(exitant.range[child][1]);
@@ -409,6 +416,7 @@ impl<L: LightField> Solver<L> {
             if area > 0.0 {
                 exitant.radiosity[node] = radiosity / area;
                 exitant.irradiance[node] = irradiance / area;
+                exitant.directional[node] = directional / area;
                 exitant.range[node] = [low, high];
             }
             exitant.facing[node] = if weight > 0.0 { facing.scaled(weight.recip()) } else { element.facing };
@@ -457,7 +465,7 @@ impl<L: LightField> Solver<L> {
         (self.settings.error * looseness).hypot(residual).min(1.0)
     }
 
-    fn progress(&self, phase: Phase, fraction: f32, looseness: f32) -> Progress {
+    pub(crate) fn progress(&self, phase: Phase, fraction: f32, looseness: f32) -> Progress {
         Progress {
             phase,
             fraction,

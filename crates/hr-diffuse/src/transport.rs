@@ -13,6 +13,9 @@ use std::f32::consts::PI;
 /// at a point; else its children are.
 const CLUSTER_FAR: f32 = 0.25;
 
+/// Senders that cannot bring more than this share of a place's irradiance are negligible there.
+pub(crate) const NEGLIGIBLE: f32 = 1e-2;
+
 /// Where the radius of a part of a surface is less than this share of its distance, the point kernel replaces the
 /// closed form: its relative error is about the square, under 0.5%.
 const FAR: f32 = 0.07;
@@ -30,6 +33,8 @@ pub struct Exitant {
     pub facing: Vec<Facing>,
     /// Mean irradiance on the node's surfaces, W/m².
     pub irradiance: Vec<Rgb>,
+    /// Mean radiant exitance as directional light, W/m².
+    pub directional: Vec<Rgb>,
     /// Leaves that stand for the senders of directional light.
     pub senders: Senders,
     /// Node whose leaves stand for a node: itself, or the nearest ancestor that sent when light was last reflected.
@@ -220,20 +225,26 @@ impl<L: LightField> Light<'_, L> {
     /// near are resolved into their parts.
     #[must_use]
     pub fn irradiance_at(&self, x: Vec3, n: Vec3, sender: u32) -> Rgb {
-        self.arriving_at(x, n, sender).0
+        self.arriving_at(x, n, sender, 0.0).0
     }
 
     /// What [`irradiance_at`](Self::irradiance_at) returns, and the share of its view (cosine-weighted hemisphere) that
     /// the sender takes up at the point if nothing is in between; 0 for lights without extent. The shares of all that
-    /// a point really sees never sum to more than 1.
+    /// a point really sees never sum to more than 1. Senders that cannot bring more than `negligible` (max channel) are
+    /// taken as points that send evenly.
     #[must_use]
-    pub(crate) fn arriving_at(&self, x: Vec3, n: Vec3, sender: u32) -> (Rgb, f32) {
+    pub(crate) fn arriving_at(&self, x: Vec3, n: Vec3, sender: u32, negligible: f32) -> (Rgb, f32) {
         let element = self.element(sender);
-        if self.emitted_most(sender) <= 0.0 {
+        let most = self.emitted_most(sender);
+        if most <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
         let to = x - element.center;
-        let distance = to.length();
+        let distance2 = to.length_squared();
+        if element.kind != Kind::Light && most * element.radius * element.radius < negligible * distance2 {
+            return self.weakly_arriving_at(to, n, sender);
+        }
+        let distance = distance2.sqrt();
         let children = element.first_child..element.first_child + element.child_count;
         let near = element.radius > CLUSTER_FAR * distance;
         if near && !children.is_empty() {
@@ -243,7 +254,7 @@ impl<L: LightField> Light<'_, L> {
             };
             if resolve {
                 return children.fold((Rgb::ZERO, 0.0), |(light, share), child| {
-                    let (more, also) = self.arriving_at(x, n, child);
+                    let (more, also) = self.arriving_at(x, n, child, negligible);
                     (light + more, share + also)
                 });
             }
@@ -261,6 +272,17 @@ impl<L: LightField> Light<'_, L> {
             Kind::Front | Kind::Back => factor,
         };
         (light, share)
+    }
+
+    /// [`arriving_at`](Self::arriving_at) for a sender with extent that matters little, `to` the point from its middle.
+    fn weakly_arriving_at(&self, to: Vec3, n: Vec3, sender: u32) -> (Rgb, f32) {
+        let element = self.element(sender);
+        let distance2 = to.length_squared();
+        let away = to / distance2.sqrt();
+        let factor = (-away.dot(n)).max(0.0) * element.area / (PI * distance2 + element.area);
+        let share = factor * element.mean_cosine(away);
+        let even = self.exitant.radiosity[sender as usize] + self.exitant.directional[sender as usize];
+        (even * share, share)
     }
 
     /// Unit direction from `x` toward a sender; for distant light against its direction.

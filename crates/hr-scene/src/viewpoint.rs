@@ -10,6 +10,8 @@ use std::f64::consts::{PI, TAU};
 const EYE_HEIGHT: f64 = 0.62;
 /// How far from the corner of a room its default camera stands, as a share of length and width.
 const CORNER_INSET: f64 = 0.14;
+/// Shares of length and width at which a place inside of a room is looked for.
+const PLACES: [f64; 5] = [0.5, 0.32, 0.68, 0.15, 0.85];
 /// Share of all directions that must end on a surface for a scene to count as a closed room.
 const CLOSED: f64 = 0.9;
 /// Rays are cast against so many of the largest surfaces at most: those that walls are made of.
@@ -81,21 +83,28 @@ impl Scene {
                 DVec3::new(across[0], across[1], height)
             })
         };
-        let middle = place([0.5, 0.5], EYE_HEIGHT);
-        let hits = sphere_directions(64).filter(|d| self.is_wall(occluders.nearest(middle, *d))).count();
-        if hits as f64 >= CLOSED * 64.0 {
-            let target = place([0.5, 0.5], 0.4);
-            let near = CORNER_INSET;
-            let far = 1.0 - near;
+        let inside = |p: &DVec3| {
+            let hits = sphere_directions(64).filter(|d| self.is_wall(occluders.nearest(*p, *d))).count();
+            hits as f64 >= CLOSED * 64.0
+        };
+        // Rooms are not always boxes: the middle is the place inside that is nearest to the middle of all.
+        let mut places: Vec<[f64; 2]> =
+            PLACES.into_iter().flat_map(|across| PLACES.map(|along| [across, along])).collect();
+        let off = |p: &[f64; 2]| (p[0] - 0.5).abs().max((p[1] - 0.5).abs());
+        places.sort_by(|a, b| off(a).total_cmp(&off(b)));
+        if let Some(middle) = places.iter().copied().find(|&p| inside(&place(p, EYE_HEIGHT))) {
+            let target = place(middle, 0.4);
             let view = |eye: &DVec3| {
                 // Free sight along some directions about the middle: a cupboard before the eye shows nothing.
                 let ahead = unit(target - *eye);
                 let free = |d: DVec3| occluders.distance(*eye, d).min((high - low).length());
                 sphere_directions(32).map(|d| free(unit(ahead + 0.6 * d))).sum::<f64>()
             };
+            let near = CORNER_INSET;
+            let far = 1.0 - near;
             let corners = [[near, near], [far, near], [near, far], [far, far]].map(|c| place(c, EYE_HEIGHT));
-            let best = corners.into_iter().max_by(|a, b| view(a).total_cmp(&view(b)));
-            let eye = best.unwrap_or(middle);
+            let best = corners.into_iter().filter(inside).max_by(|a, b| view(a).total_cmp(&view(b)));
+            let eye = best.unwrap_or(place(middle, EYE_HEIGHT));
             if (eye - target).length() > 0.0 {
                 return camera(eye, target, 70.0);
             }

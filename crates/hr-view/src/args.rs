@@ -39,7 +39,7 @@ pub struct Args {
     pub mode: Mode,
 
     /// The accuracy asked for: relative error of the solution, 0.001 to 1
-    #[arg(long, value_name = "E", value_parser = error, default_value_t = 0.2, allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", value_parser = error, default_value_t = 0.15, allow_negative_numbers = true)]
     pub error: f32,
 
     /// Stop refining after so many seconds and show what there is

@@ -33,7 +33,7 @@ impl Solved {
         let mut solver = Solver::new(&scene.input(), settings, field)?;
         solver.solve(watch);
         if distributions {
-            solver.reflect_for_display();
+            solver.reflect_for_display(watch);
         }
         let solution = solver.finish(watch);
         Ok(Self { scene, solution })

@@ -69,7 +69,6 @@ fn meshes_are_sound_and_face_outward() {
 /// A sphere's triangles close it: every edge belongs to two of them, once in each direction, and none is far from
 /// round, on either side and however few leaves there are.
 #[test]
-#[ignore = "solves a glossy scene, which takes minutes"]
 fn curved_surfaces_are_round_and_closed() {
     let sphere = Shape::Sphere { center: DVec3::new(1e3, -5.0, 2.0), radius: 3.0 };
     let torus = Shape::Torus { center: DVec3::ZERO, axis: DVec3::Z, major: 2.0, minor: 0.7 };
@@ -154,7 +153,6 @@ fn backs_that_absorb_are_black_and_opaque() {
 
 /// Vertices toward an eye show what the ray caster shows there.
 #[test]
-#[ignore = "solves a glossy scene, which takes minutes"]
 fn glossy_vertices_agree_with_the_ray_caster() {
     let solved = built_in("three-lights", 0.5);
     let scene = &solved.scene;
