@@ -169,7 +169,7 @@ fn place_leaf<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32) -> P
         own.extend(links.of(leaf).iter().map(|link| link.sender).filter(|&s| light.element(s).kind != Kind::Cluster));
         own.sort_unstable();
     }
-    let seen = look_around(light, element.source, &points, leaf, |sender| own.binary_search(&sender).is_ok());
+    let seen = look_around(light, element.source, &points, leaf, 0.0, |sender| own.binary_search(&sender).is_ok());
     Placed { inherited, row: row.correction(&seen) }
 }
 

@@ -31,6 +31,8 @@ const MOST_RAYS: f32 = 24.0;
 /// that looked wholly visible or hidden.
 const PARTIAL_SHARE: f32 = 0.002;
 const WHOLE_SHARE: f32 = 0.01;
+/// What is nearer to a vertex than this share of its leaf's radius, all around, covers it.
+const COVER: f32 = 0.25;
 /// Most finer levels that a neighbour may have.
 const EDGE_DEPTH: u32 = 14;
 
@@ -240,20 +242,44 @@ pub(crate) fn reconstruct<L: LightField>(
     let mut rays = 0;
     let mut renew = true;
     let chunk = (count / 50).max(2048);
-    let mut irradiance = Vec::with_capacity(count);
+    let mut covered = Vec::with_capacity(count);
     for start in (0..count).step_by(chunk) {
         let end = (start + chunk).min(count);
-        let part: Vec<(Rgb, u32)> = (start..end)
+        let part: Vec<Gathering> = (start..end)
             .into_par_iter()
             .with_min_len(16)
             .map(|vertex| gather_at(light, links, vertices.leaf[vertex], vertices.uv[vertex], vertex as u32, renew))
             .collect();
-        rays += part.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
-        irradiance.extend(part.into_iter().map(|(irradiance, _)| irradiance));
+        for (vertex, gathering) in (start..end).zip(part) {
+            rays += u64::from(gathering.rays);
+            vertices.irradiance[vertex] = gathering.irradiance;
+            covered.push(gathering.covered);
+        }
         renew &= watch(end as f32 / count as f32).is_continue();
     }
-    vertices.irradiance = irradiance;
+    uncover(&mut vertices, &covered);
     (vertices, rays)
+}
+
+/// Nobody sees the darkness behind a picture on a wall or below a cupboard, but interpolation would carry it to where it
+/// is seen: vertices there take the mean irradiance of the others around.
+fn uncover(vertices: &mut Vertices, covered: &[bool]) {
+    let mut lit: Vec<(u32, Rgb)> = Vec::new();
+    for vertex in (0..covered.len() as u32).filter(|&vertex| covered[vertex as usize]) {
+        let (mut sum, mut count) = (Rgb::ZERO, 0.0);
+        for &leaf in vertices.leaves_around(vertex) {
+            for corner in vertices.fan(leaf).iter().filter(|corner| !covered[corner.vertex as usize]) {
+                sum += vertices.irradiance[corner.vertex as usize];
+                count += 1.0;
+            }
+        }
+        if count > 0.0 {
+            lit.push((vertex, sum / count));
+        }
+    }
+    for (vertex, irradiance) in lit {
+        vertices.irradiance[vertex as usize] = irradiance;
+    }
 }
 
 /// Irradiance at a point of a leaf, gathered over all links that light it.
@@ -264,7 +290,7 @@ fn gather_at<L: LightField>(
     uv: Vec2,
     seed: u32,
     renew: bool,
-) -> (Rgb, u32) {
+) -> Gathering {
     let element = light.element(leaf);
     let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET));
@@ -311,9 +337,16 @@ fn gather_at<L: LightField>(
     }
     renewed_here.sort_unstable();
     let is_own = |sender: u32| renewed_here.binary_search(&sender).is_ok();
-    let seen = look_around(light, element.source, &[(x, n, 1.0)], seed, is_own);
+    let seen = look_around(light, element.source, &[(x, n, 1.0)], seed, COVER * element.radius, is_own);
     let placed = Placed { row: row.correction(&seen), ..Placed::default() };
-    (placed.irradiance(own, kept), rays)
+    Gathering { irradiance: placed.irradiance(own, kept), rays, covered: seen.covered }
+}
+
+/// What was gathered at a vertex.
+struct Gathering {
+    irradiance: Rgb,
+    rays: u32,
+    covered: bool,
 }
 
 /// Light of one link at a vertex, unoccluded, and the share of the vertex's view that its sender takes up.

@@ -8,6 +8,7 @@ use crate::hooks::LightField;
 use crate::place::Class;
 use crate::sampling::{hash, point2};
 use crate::transport::Light;
+use crate::visibility::Hit;
 use glam::{Vec2, Vec3};
 use std::f32::consts::TAU;
 
@@ -28,18 +29,21 @@ pub(crate) struct Seen {
     shares: Row,
     /// Whether nothing but senders is seen.
     closed: bool,
+    /// Whether something covers the place: nearly all that is seen is nearer than asked for.
+    pub(crate) covered: bool,
 }
 
 /// Looks around from `points`, positions with unit normals on a surface, among which the rays are dealt out. `own` tells
-/// which senders count as the place's own.
+/// which senders count as the place's own. What is nearer than `near` may cover it.
 pub(crate) fn look_around<L: LightField>(
     light: Light<'_, L>,
     surface: u32,
     points: &[(Vec3, Vec3, f32)],
     seed: u32,
+    near: f32,
     own: impl Fn(u32) -> bool,
 ) -> Seen {
-    let (mut hits, mut rays) = ([0_u16; 3], 0);
+    let (mut hits, mut rays, mut close) = ([0_u16; 3], 0, 0);
     for (i, &(x, n, _)) in points.iter().enumerate() {
         let (a, b) = n.any_orthonormal_pair();
         for cell in 0..GRID * GRID {
@@ -51,24 +55,25 @@ pub(crate) fn look_around<L: LightField>(
             let (sin, cos) = (TAU * u.x).sin_cos();
             let direction = (a * cos + b * sin) * u.y.sqrt() + n * (1.0 - u.y).sqrt();
             rays += 1;
-            if let Some(kind) = meet(light, surface, x, direction, &own) {
+            let Some(hit) = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface) else {
+                continue;
+            };
+            close += u16::from(hit.t < near);
+            if let Some(kind) = kind(light, &hit, &own) {
                 hits[kind] += 1;
             }
         }
     }
     let [emitters, own, inherited] = hits.map(|hits| f32::from(hits) / rays.max(1) as f32);
-    Seen { shares: Row { emitters, own, inherited }, closed: hits.iter().sum::<u16>() == rays }
+    Seen {
+        shares: Row { emitters, own, inherited },
+        closed: hits.iter().sum::<u16>() == rays,
+        covered: 10 * close >= 9 * rays,
+    }
 }
 
-/// What a ray meets: an emitter (0), one of a place's own senders (1) or another sender (2).
-fn meet<L: LightField>(
-    light: Light<'_, L>,
-    surface: u32,
-    x: Vec3,
-    direction: Vec3,
-    own: impl Fn(u32) -> bool,
-) -> Option<usize> {
-    let hit = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface)?;
+/// What a ray met: an emitter (0), one of a place's own senders (1) or another sender (2).
+fn kind<L: LightField>(light: Light<'_, L>, hit: &Hit, own: impl Fn(u32) -> bool) -> Option<usize> {
     let mut node = light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv)?.0;
     if light.emitted_most(node) <= 0.0 {
         return None;

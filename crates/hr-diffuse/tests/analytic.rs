@@ -151,3 +151,32 @@ fn nothing_passes_through_a_wall() {
         assert_eq!(plate_irradiance(&input, 0.1), 0.0, "under a sheet at height {z}");
     }
 }
+
+/// A picture that hangs before a wall darkens only what is behind it: beside it the wall is as bright as bare.
+#[test]
+fn the_darkness_behind_a_picture_stays_there() {
+    let lamp = FLOOR.map(|p| DVec3::new(4.0 * p.y - 1.5, 4.0 * p.x - 1.5, 2.0));
+    let bare = lit_plate(FLOOR, vec![Shape::Quad(lamp)]);
+    let mut hung = bare.clone();
+    let picture = FLOOR.map(|p| DVec3::new(0.3 + 0.4 * p.x, 0.3 + 0.4 * p.y, 0.002));
+    hung.surfaces.push(Surface::new(Shape::Quad(picture), 0));
+    let (bare, hung) = (solve(&bare, 0.05), solve(&hung, 0.05));
+    let at = |solution: &Solution, x: f32, y: f32| {
+        let uv = glam::Vec2::new(x, y);
+        let leaf = solution.elements.leaf_at(&solution.scene, 0, false, uv).expect("the wall is lit");
+        solution.irradiance(leaf, uv).x
+    };
+    for i in 0..20 {
+        for j in 0..20 {
+            let [x, y] = [i, j].map(|k| (k as f32 + 0.5) / 20.0);
+            let (without, with) = (at(&bare, x, y), at(&hung, x, y));
+            let beside = (x - 0.5).abs().max((y - 0.5).abs()) > 0.2;
+            if beside {
+                assert!(
+                    (with / without - 1.0).abs() < 0.1,
+                    "at ({x}, {y}): {with} against {without} without a picture"
+                );
+            }
+        }
+    }
+}

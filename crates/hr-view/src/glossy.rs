@@ -7,7 +7,7 @@ use glossy_ext::{GlossyField, Incident, Place, Reflector, arriving};
 use hr_diffuse::{LightField, NodeId, Rgb, Solution};
 use std::f32::consts::FRAC_1_PI;
 
-/// Cosine below which a curved leaf's intensity per area is no longer divided by it: both vanish toward the horizon.
+/// Cosine below which a distribution says less and less about what is reflected: it is no longer divided by it.
 const LEAST_COSINE: f32 = 0.05;
 
 /// Where glossy light comes from, in images, frames and the window.
@@ -20,38 +20,43 @@ pub enum Mode {
     Samples,
 }
 
-/// Radiance (W/(m² sr)) from a leaf's distribution in the unit direction `away`, without the diffuse part.
-#[must_use]
-pub fn leaving(solution: &Solution<GlossyField>, leaf: NodeId, away: Vec3) -> Rgb {
+/// Radiance (W/(m² sr)) from a leaf's distribution at a place of the leaf with the unit normal given, in the unit
+/// direction `away`, without the diffuse part; and the weight that it has among its neighbours'.
+///
+/// The leaf's distribution is that of its own normal. What the place reflects toward `away` comes from the mirrored
+/// direction; the leaf reflects the same toward another one, which is where its distribution is asked.
+fn leaving(solution: &Solution<GlossyField>, leaf: NodeId, normal: Vec3, away: Vec3) -> (Rgb, f32) {
     let element = &solution.elements.nodes[leaf.index()];
+    let axis = element.normals.axis;
+    let mirrored = away.reflect(normal);
+    let away = mirrored.reflect(axis);
+    let weight = away.dot(axis).max(LEAST_COSINE);
     let distribution = &solution.reflected[leaf.index()];
     if distribution.is_empty() {
         // Carried as diffuse light.
         let albedo = solution.field.active(element.material).unwrap_or(Rgb::ZERO);
-        return solution.exitant.irradiance[leaf.index()] * albedo * FRAC_1_PI;
+        return (solution.exitant.irradiance[leaf.index()] * albedo * FRAC_1_PI, weight);
     }
     let light = distribution.eval(away);
-    if element.is_flat() {
-        light
-    } else {
-        // Intensity per area over the cosine.
-        light / element.mean_cosine(away).max(LEAST_COSINE)
-    }
+    // Elsewhere it is intensity per area.
+    (if element.is_flat() { light } else { light / weight }, weight)
 }
 
-/// Radiance from the distributions around some vertices in the unit direction `away`, interpolated with the weights
-/// given (paper, section 5.2).
+/// Radiance from the distributions around some vertices of a leaf, interpolated with the weights given (paper, section
+/// 5.2), at a place with the unit normal given, in the unit direction `away`.
 #[must_use]
-pub fn interpolated(solution: &Solution<GlossyField>, corners: &[(u32, f32)], away: Vec3) -> Rgb {
-    let mut sum = Rgb::ZERO;
-    for &(vertex, weight) in corners {
-        if weight > 0.0 {
-            let around = solution.vertices.leaves_around(vertex);
-            let light: Rgb = around.iter().map(|&leaf| leaving(solution, NodeId(leaf), away)).sum();
-            sum += light * (weight / around.len().max(1) as f32);
+pub fn interpolated(solution: &Solution<GlossyField>, corners: &[(u32, f32)], normal: Vec3, away: Vec3) -> Rgb {
+    let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
+    for &(vertex, share) in corners.iter().filter(|(_, share)| *share > 0.0) {
+        let around = solution.vertices.leaves_around(vertex);
+        for &leaf in around {
+            let (light, weight) = leaving(solution, NodeId(leaf), normal, away);
+            let weight = weight * share / around.len() as f32;
+            sum += light * weight;
+            weights += weight;
         }
     }
-    sum
+    sum / weights.max(f32::MIN_POSITIVE)
 }
 
 /// Radiance that a reflector makes of the illumination samples that arrive at a place of a leaf (paper, section 3.4),

@@ -121,10 +121,7 @@ impl<'a> RayCaster<'a> {
         let normal = if facing > 0.02 { shading } else { (shading + away * (0.02 - facing)).normalize() };
         let met = Met { hit, leaf, normal, away, reflector };
         let glossy = match self.mode {
-            Mode::Distributions => {
-                let corners = self.solution.vertices.interpolation(leaf.0, met.hit.uv);
-                glossy::interpolated(self.solution, &corners, away)
-            }
+            Mode::Distributions => self.interpolated(&met),
             Mode::Samples if bounce == 0 => self.reflected(&met, bounce, seed, scratch),
             Mode::Samples if met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES => {
                 self.reflected(&met, bounce, seed, scratch)
@@ -137,9 +134,15 @@ impl<'a> RayCaster<'a> {
                 let place = Place::new(met.hit.point, met.normal);
                 glossy::reflected(self.solution, &*met.reflector, leaf, &place, away, NARROWEST, scratch)
             }
-            Mode::Samples => glossy::leaving(self.solution, leaf, away),
+            Mode::Samples => self.interpolated(&met),
         };
         emitted + (diffuse + glossy).max(Rgb::ZERO)
+    }
+
+    /// Glossy radiance from the distributions around the point.
+    fn interpolated(&self, met: &Met) -> Rgb {
+        let corners = self.solution.vertices.interpolation(met.leaf.0, met.hit.uv);
+        glossy::interpolated(self.solution, &corners, met.normal, met.away)
     }
 
     /// Glossy radiance from the samples that arrive at the point, or along rays where the lobe is narrow.

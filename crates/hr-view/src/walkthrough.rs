@@ -40,6 +40,7 @@ impl<'a> Walkthrough<'a> {
         let surface = solution.elements.nodes[source.leaf as usize].source;
         let at = solution.scene.surfaces()[surface as usize].point(source.uv);
         let away = (eye - at).normalize_or_zero();
+        let normal = self.mesh.normals[self.mesh.glossy[slot] as usize];
         if self.mode == Mode::Samples {
             let material = &self.solved.scene.materials[solution.scene.surface_materials[surface as usize] as usize];
             if material.reflector.mirror() == Rgb::ZERO {
@@ -47,13 +48,12 @@ impl<'a> Walkthrough<'a> {
                 let reflector = color
                     .and_then(|color| material.reflector.with_base_color(color))
                     .unwrap_or_else(|| Arc::clone(&material.reflector));
-                let normal = self.mesh.normals[self.mesh.glossy[slot] as usize];
                 let place = Place::new(at, normal);
                 let leaf = NodeId(source.leaf);
                 return glossy::reflected(solution, reflector.as_ref(), leaf, &place, away, NARROWEST, scratch);
             }
         }
-        glossy::interpolated(solution, &source.corners, away)
+        glossy::interpolated(solution, &source.corners, normal, away)
     }
 }
 

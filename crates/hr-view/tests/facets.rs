@@ -195,6 +195,20 @@ fn glossy_vertices_agree_with_the_ray_caster() {
     assert!(compared > 20 && close * 10 >= compared * 9, "{close} of {compared} vertices agree");
 }
 
+/// A leaf of a curved surface has one distribution, but each place on it reflects what is mirrored there: the picture
+/// comes near that of the samples, which are reflected with the normal of every pixel.
+#[test]
+fn curved_leaves_reflect_with_the_normals_of_their_places() {
+    let solved = built_in("glossy-sphere", 0.3);
+    let camera = Camera { width: 80, height: 60, ..solved.scene.default_camera() };
+    let [a, b] = [Mode::Distributions, Mode::Samples]
+        .map(|mode| RayCaster::new(&solved.scene, &solved.solution, mode).render(&camera, &|_| ()).pixels);
+    let difference: f32 = a.iter().zip(&b).map(|(a, b)| (*a - *b).abs().element_sum()).sum();
+    let share = difference / b.iter().map(|b| b.element_sum()).sum::<f32>();
+    // 43 % with the normals of the leaves.
+    assert!(share < 0.25, "the modes differ by {share} of the light");
+}
+
 #[test]
 fn the_device_draws_what_the_ray_caster_sees() {
     let solved = built_in("cornell", 0.3);
