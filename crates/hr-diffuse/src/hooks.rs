@@ -13,7 +13,7 @@
 //! Leaves whose light no link asks for may be left out of 3.
 //!
 //! Receivers run in parallel; each call writes only what it is given or returns, and reads only what the step
-//! before made: gather reads exitant and writes incident light, reflect and pull the reverse.
+//! before made: gather reads exitant and writes incident light, reflect the reverse.
 
 use crate::{Cone, Rgb};
 use glam::Vec3;
