@@ -166,8 +166,8 @@ pub struct Elements {
     pub surface_nodes: Vec<[u32; 2]>,
     /// Points that stand for parts of curved surfaces.
     pub facets: Vec<[Facet; FACETS]>,
-    /// Sides of surfaces left out because no light can reach them.
-    pub sealed: u64,
+    /// Sides of surfaces left out because no light can reach them: front and back of each.
+    sealed: Vec<[bool; 2]>,
 }
 
 struct Boxed(obvhs::aabb::Aabb);
@@ -182,7 +182,7 @@ impl Elements {
     /// reflects of a material beside the diffuse part; `None` where it takes no part.
     pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<Rgb>) -> Self {
         let mut roots: Vec<Element> = Vec::new();
-        let mut sealed = 0;
+        let mut sealed = vec![[false; 2]; scene.surfaces().len()];
         for (i, lit) in lit_sides(scene).into_iter().enumerate() {
             let material = &scene.materials[scene.surface_materials[i] as usize];
             let glossy = extra(scene.surface_materials[i]);
@@ -194,7 +194,7 @@ impl Elements {
             if back && lit[1] {
                 roots.push(patch(scene, i as u32, Kind::Back, Domain::WHOLE, glossy));
             }
-            sealed += u64::from(!lit[0]) + u64::from(back && !lit[1]);
+            sealed[i] = [!lit[0], back && !lit[1]];
         }
         // Fronts and backs in trees of their own: what a cluster faces is then known better.
         let (fronts, backs): (Vec<Element>, Vec<Element>) = roots.into_iter().partition(|e| e.kind == Kind::Front);
@@ -215,6 +215,16 @@ impl Elements {
             elements.add_facets(scene, node);
         }
         elements
+    }
+
+    /// Whether no light can reach a surface's front or back, which would reflect it.
+    pub(crate) fn is_sealed(&self, surface: u32, back: bool) -> bool {
+        self.sealed[surface as usize][usize::from(back)]
+    }
+
+    /// Sides of surfaces left out because no light can reach them.
+    pub(crate) fn sealed_sides(&self) -> u64 {
+        self.sealed.iter().flatten().filter(|sealed| **sealed).count() as u64
     }
 
     /// Lays down the facets of a part of a curved surface.

@@ -9,6 +9,7 @@
 mod columns;
 pub mod cone;
 pub mod error;
+mod exposed;
 pub mod facing;
 pub mod form_factor;
 pub mod geometry;

@@ -1,6 +1,8 @@
 //! Links: who lights whom, through which form factor, how visibly. 16 bytes each, sorted by receiver.
 
+use crate::hierarchy::Elements;
 use rayon::prelude::*;
+use std::hash::{DefaultHasher, Hasher};
 
 /// Light passes from `sender` to `receiver`.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -53,6 +55,20 @@ impl Links {
             Some(range) => &self.all[range[0] as usize..range[1] as usize],
             None => &[],
         }
+    }
+
+    /// By node, a hash of the links that it receives through, and the surface that it is a part of.
+    pub(crate) fn hashes(&self, elements: &Elements) -> Vec<u64> {
+        let mut hashes = vec![0; elements.nodes.len()];
+        for (node, element) in elements.nodes.iter().enumerate() {
+            let mut hasher = DefaultHasher::new();
+            if elements.nodes[element.parent as usize].is_patch() {
+                hasher.write_u64(hashes[element.parent as usize]);
+            }
+            hasher.write(bytemuck::cast_slice(self.of(node as u32)));
+            hashes[node] = hasher.finish();
+        }
+        hashes
     }
 
     pub(crate) fn take(&mut self) -> Vec<Link> {

@@ -19,6 +19,9 @@ use smallvec::{SmallVec, smallvec};
 /// lie in one another's plane hide each other by turns, which no ray can tell.
 const MOST_CHANGE: f32 = 4.0;
 
+/// Links that bring less than this share of the error asked for, relative to all that arrives, count as they were pushed.
+const FAINT_SHARE: f32 = 0.03;
+
 /// How well it is known what a sender brings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Class {
@@ -99,24 +102,40 @@ impl Placed {
     }
 }
 
-/// Places all leaves; by node.
-pub(crate) fn place<L: LightField>(light: Light<'_, L>, links: &Links) -> Vec<Placed> {
-    let leaves: Vec<u32> = light.elements.patch_leaves().collect();
-    let places: Vec<Placed> = leaves.par_iter().with_min_len(16).map(|&leaf| place_leaf(light, links, leaf)).collect();
-    let mut placed = vec![Placed::default(); light.elements.nodes.len()];
+/// Places the leaves that are `stale`, to the error asked for; by node. The others keep what they have. `exposed`
+/// is the share of each that is not covered.
+pub(crate) fn place<L: LightField>(
+    light: Light<'_, L>,
+    links: &Links,
+    error: f32,
+    exposed: &[f32],
+    stale: impl Fn(u32) -> bool,
+    placed: &mut Vec<Placed>,
+) {
+    let leaves: Vec<u32> = light.elements.patch_leaves().filter(|&leaf| stale(leaf)).collect();
+    let places: Vec<Placed> = leaves
+        .par_iter()
+        .with_min_len(16)
+        .map(|&leaf| match place_leaf(light, links, leaf, error) {
+            // What is seen from the middle of the leaf is nothing to what is open of it.
+            placed if exposed[leaf as usize] < 1.0 => Placed { row: Correction::default(), ..placed },
+            placed => placed,
+        })
+        .collect();
+    placed.resize(light.elements.nodes.len(), Placed::default());
     for (leaf, place) in leaves.into_iter().zip(places) {
         placed[leaf as usize] = place;
     }
-    placed
 }
 
-fn place_leaf<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32) -> Placed {
+fn place_leaf<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, error: f32) -> Placed {
     let element = light.element(leaf);
     if element.importance <= 0.0 {
         return Placed::default();
     }
     let points = sample_points(light.scene, element);
     let negligible = NEGLIGIBLE * light.exitant.irradiance[leaf as usize].max_element();
+    let faint = FAINT_SHARE * error * light.exitant.irradiance[leaf as usize].element_sum();
     // By groups of classes: light at the points, light pushed down, and what would be pushed down of unit radiosity.
     let (mut exact, mut pushed, mut inherited_row) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     let mut row = Row::default();
@@ -147,6 +166,11 @@ fn place_leaf<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32) -> P
             let pattern =
                 if class == Class::Cluster { light.element(link.sender).mean_cosine(-direction) } else { 1.0 };
             inherited_row[class.group()] += carried * pattern;
+            let brought = carried * light.emitted(link.sender, -direction).element_sum();
+            if brought < faint {
+                exact[class.group()] += brought;
+                continue;
+            }
             for &(x, n, weight) in &points {
                 exact[class.group()] +=
                     visible * weight * light.arriving_at(x, n, link.sender, negligible).0.element_sum();

@@ -1,22 +1,36 @@
-//! Sides of surfaces that no light can reach, such as the insides of closed objects.
+//! Sides of surfaces that no light can reach, such as the insides of closed objects and of boxes that stand on a floor.
 //!
-//! What a ray joins sees each other, so light passes either way. Rays from all sides of all surfaces join them to groups;
-//! groups without any light stay dark whatever is computed, and need no elements.
+//! What a ray joins sees each other, so light passes either way. Rays join spots of surfaces to groups; groups without
+//! any light stay dark whatever is computed. A large flat side has several spots, for it may be divided by what stands
+//! on it: a floor is lit, but not where a box covers it. Two spots on it belong together if a line just above it, from
+//! one to the other, is free.
 
 use crate::Rgb;
 use crate::geometry::Domain;
 use crate::hierarchy::SceneData;
-use crate::sampling::{hash, point4};
+use crate::sampling::{hash, point2, point4};
 use crate::segments::light_segment;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use smallvec::SmallVec;
 use std::f32::consts::TAU;
 
-/// Rays per side in successive rounds; only sides of groups that are still dark take part in the next one.
-const ROUNDS: [u32; 4] = [4, 12, 48, 192];
+/// Rays per spot in successive rounds; only spots of groups that are still dark take part in the next one.
+const ROUNDS: [u32; 4] = [2, 6, 24, 96];
 
 /// Rays are confirmed by others that turn away from them by this (radians).
 const BESIDE: f32 = 2e-3;
+
+/// Flat surfaces whose radius in unit space is larger have several spots, so many at first and at most.
+const LARGE: f32 = 0.02;
+const FIRST_SPOTS: u32 = 4;
+const MOST_SPOTS: usize = 64;
+
+/// How far above a surface lines between its spots run, in unit space.
+const ABOVE: f32 = 1e-3;
+
+/// A point is joined to so many of the spots around it.
+const NEAREST: usize = 6;
 
 /// A side of a surface: twice the surface's index, plus 1 for the back.
 type Side = u32;
@@ -27,26 +41,26 @@ type Side = u32;
 /// A side that sees lit ones in less than about a hundredth of its view may be missed.
 pub(crate) fn lit_sides(scene: &SceneData) -> Vec<[bool; 2]> {
     let count = scene.surfaces().len();
-    let mut groups = Groups::new(2 * count);
-    for surface in 0..count {
-        groups.lit[2 * surface] = scene.materials[scene.surface_materials[surface] as usize].exitance != Rgb::ZERO;
-    }
+    let mut spots = Spots::new(scene);
     let mut first = 0;
     for rays in ROUNDS {
-        let dark: Vec<Side> =
-            (0..2 * count as u32).filter(|&side| reflects(scene, side) && !groups.is_lit(side)).collect();
-        let seen: Vec<Seen> = dark.par_iter().map(|&side| look(scene, side, first..first + rays)).collect();
-        for (&side, seen) in dark.iter().zip(&seen) {
-            for &other in &seen.sides {
-                groups.join(side, other);
+        let dark: Vec<u32> = (0..spots.all.len() as u32)
+            .filter(|&spot| reflects(scene, spots.all[spot as usize].side) && !spots.groups.is_lit(spot))
+            .collect();
+        let seen: Vec<Seen> =
+            dark.par_iter().map(|&spot| look(scene, &spots.all[spot as usize], spot, first..first + rays)).collect();
+        for (&spot, seen) in dark.iter().zip(&seen) {
+            for met in &seen.met {
+                spots.join(scene, spot, met);
             }
             if seen.light {
-                groups.light(side);
+                spots.groups.light(spot);
             }
         }
         first += rays;
     }
-    let lit: Vec<[bool; 2]> = (0..count as u32).map(|s| [2 * s, 2 * s + 1].map(|side| groups.is_lit(side))).collect();
+    let mut is_lit = |side: usize| spots.of_side[side].iter().any(|&spot| spots.groups.is_lit(spot));
+    let lit: Vec<[bool; 2]> = (0..count).map(|surface| [2 * surface, 2 * surface + 1].map(&mut is_lit)).collect();
     if lit.iter().flatten().any(|lit| *lit) { lit } else { vec![[true; 2]; count] }
 }
 
@@ -56,35 +70,47 @@ fn reflects(scene: &SceneData, side: Side) -> bool {
     side.is_multiple_of(2) || material.two_sided
 }
 
-/// What a side sees.
+/// A place on a side, which stands for what is around it.
+struct Spot {
+    side: Side,
+    at: Vec3,
+    normal: Vec3,
+}
+
+/// What a spot sees.
 struct Seen {
-    sides: Vec<Side>,
+    met: Vec<Spot>,
     /// A light without extent.
     light: bool,
 }
 
-fn look(scene: &SceneData, side: Side, rays: std::ops::Range<u32>) -> Seen {
-    let surface = side / 2;
+fn look(scene: &SceneData, spot: &Spot, seed: u32, rays: std::ops::Range<u32>) -> Seen {
+    let surface = spot.side / 2;
     let geometry = &scene.surfaces()[surface as usize];
-    let mut seen = Seen { sides: Vec::new(), light: false };
+    let mut seen = Seen { met: Vec::new(), light: false };
+    let whole = !is_large(scene, surface);
     for i in rays {
-        let u = point4(hash(side, 0x5ea1), i);
-        let (x, normal, _) = geometry.sample_area(Domain::WHOLE, u.x, u.y);
-        let n = if side.is_multiple_of(2) { normal } else { -normal };
+        let u = point4(hash(seed, 0x5ea1), i);
+        let (x, n) = if whole {
+            let (x, normal, _) = geometry.sample_area(Domain::WHOLE, u.x, u.y);
+            (x, if spot.side.is_multiple_of(2) { normal } else { -normal })
+        } else {
+            (spot.at, spot.normal)
+        };
         let (a, b) = n.any_orthonormal_pair();
         let (sin, cos) = (TAU * u.z).sin_cos();
         let direction = (a * cos + b * sin) * u.w.sqrt() + n * (1.0 - u.w).sqrt();
         // Between surfaces that nearly meet single rays slip through: what is seen must be seen a little beside, too.
-        let met = [Vec3::ZERO, a * BESIDE, b * BESIDE].map(|beside| {
-            let hit = scene.visibility.closest_except(x, direction + beside, 0.0, f32::MAX, surface);
-            hit.map(|hit| 2 * hit.surface + u32::from(!hit.front))
-        });
-        if let [Some(other), Some(second), Some(third)] = met
-            && other == second
-            && other == third
-            && reflects(scene, other)
+        let met = [Vec3::ZERO, a * BESIDE, b * BESIDE]
+            .map(|beside| scene.visibility.closest_except(x, direction + beside, 0.0, f32::MAX, surface));
+        let side = |hit: &crate::Hit| 2 * hit.surface + u32::from(!hit.front);
+        if let [Some(hit), Some(second), Some(third)] = &met
+            && side(hit) == side(second)
+            && side(hit) == side(third)
+            && reflects(scene, side(hit))
         {
-            seen.sides.push(other);
+            let normal = if hit.front { hit.normal } else { -hit.normal };
+            seen.met.push(Spot { side: side(hit), at: hit.point, normal });
         }
         let mut blocker = u32::MAX;
         seen.light |= (0..scene.lights.len()).any(|light| {
@@ -95,37 +121,126 @@ fn look(scene: &SceneData, side: Side, rays: std::ops::Range<u32>) -> Seen {
     seen
 }
 
-/// Disjoint sets of sides, by union with path halving; a set is lit if any of its members is.
+/// Whether a surface has several spots.
+fn is_large(scene: &SceneData, surface: u32) -> bool {
+    let geometry = &scene.surfaces()[surface as usize];
+    geometry.is_polygon() && geometry.bounds(Domain::WHOLE).radius() > LARGE
+}
+
+/// All spots, and to what groups rays have joined them.
+struct Spots {
+    all: Vec<Spot>,
+    of_side: Vec<SmallVec<[u32; 4]>>,
+    groups: Groups,
+}
+
+impl Spots {
+    fn new(scene: &SceneData) -> Self {
+        let count = scene.surfaces().len();
+        let mut spots = Self { all: Vec::new(), of_side: vec![SmallVec::new(); 2 * count], groups: Groups::default() };
+        for surface in 0..count as u32 {
+            let geometry = &scene.surfaces()[surface as usize];
+            let emits = scene.materials[scene.surface_materials[surface as usize] as usize].exitance != Rgb::ZERO;
+            let places = if is_large(scene, surface) { FIRST_SPOTS } else { 1 };
+            for side in [2 * surface, 2 * surface + 1] {
+                for place in 0..places {
+                    let u: Vec2 = point2(hash(side, 0x59), place);
+                    let (at, normal, _) = geometry.sample_area(Domain::WHOLE, u.x, u.y);
+                    let normal = if side.is_multiple_of(2) { normal } else { -normal };
+                    let spot = spots.add(Spot { side, at, normal }, emits && side.is_multiple_of(2));
+                    spots.connect(scene, spot);
+                }
+            }
+        }
+        spots
+    }
+
+    fn add(&mut self, spot: Spot, lit: bool) -> u32 {
+        let id = self.groups.add(lit);
+        self.of_side[spot.side as usize].push(id);
+        self.all.push(spot);
+        id
+    }
+
+    /// Joins a spot to what a ray from it met.
+    fn join(&mut self, scene: &SceneData, spot: u32, met: &Spot) {
+        let there = &self.of_side[met.side as usize];
+        if !is_large(scene, met.side / 2) {
+            let other = there[0];
+            self.groups.join(spot, other);
+            return;
+        }
+        let around = self.reached(scene, met);
+        if around.is_empty() && there.len() < MOST_SPOTS {
+            let other = self.add(Spot { side: met.side, at: met.at, normal: met.normal }, false);
+            self.groups.join(spot, other);
+        }
+        for other in around {
+            self.groups.join(spot, other);
+        }
+    }
+
+    /// Joins a new spot to the others on its side.
+    fn connect(&mut self, scene: &SceneData, spot: u32) {
+        let Spot { side, at, normal } = self.all[spot as usize];
+        for other in self.reached(scene, &Spot { side, at, normal }) {
+            self.groups.join(spot, other);
+        }
+    }
+
+    /// Of the spots nearest to a place on a large flat side those that a line just above it reaches.
+    fn reached(&self, scene: &SceneData, place: &Spot) -> SmallVec<[u32; NEAREST]> {
+        let mut there: SmallVec<[(f32, u32); 64]> = self.of_side[place.side as usize]
+            .iter()
+            .map(|&spot| (self.all[spot as usize].at.distance_squared(place.at), spot))
+            .collect();
+        there.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let lift = place.normal * ABOVE;
+        let own = place.side / 2;
+        let mut blocker = u32::MAX;
+        let mut free = |&(_, spot): &(f32, u32)| {
+            let to = self.all[spot as usize].at;
+            !scene.visibility.occluded(place.at + lift, to + lift, [own, own], &mut blocker)
+        };
+        there.iter().take(NEAREST).filter(|near| free(near)).map(|&(_, spot)| spot).collect()
+    }
+}
+
+/// Disjoint sets of spots, by union with path halving; a set is lit if any of its members is.
+#[derive(Default)]
 struct Groups {
-    parent: Vec<Side>,
+    parent: Vec<u32>,
     lit: Vec<bool>,
 }
 
 impl Groups {
-    fn new(count: usize) -> Self {
-        Self { parent: (0..count as u32).collect(), lit: vec![false; count] }
+    fn add(&mut self, lit: bool) -> u32 {
+        let id = self.parent.len() as u32;
+        self.parent.push(id);
+        self.lit.push(lit);
+        id
     }
 
-    fn root(&mut self, mut side: Side) -> usize {
-        while self.parent[side as usize] != side {
-            let above = self.parent[self.parent[side as usize] as usize];
-            self.parent[side as usize] = above;
-            side = above;
+    fn root(&mut self, mut spot: u32) -> usize {
+        while self.parent[spot as usize] != spot {
+            let above = self.parent[self.parent[spot as usize] as usize];
+            self.parent[spot as usize] = above;
+            spot = above;
         }
-        side as usize
+        spot as usize
     }
 
-    fn is_lit(&mut self, side: Side) -> bool {
-        let root = self.root(side);
+    fn is_lit(&mut self, spot: u32) -> bool {
+        let root = self.root(spot);
         self.lit[root]
     }
 
-    fn light(&mut self, side: Side) {
-        let root = self.root(side);
+    fn light(&mut self, spot: u32) {
+        let root = self.root(spot);
         self.lit[root] = true;
     }
 
-    fn join(&mut self, a: Side, b: Side) {
+    fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.lit[a] |= self.lit[b];
         self.parent[b] = a as u32;

@@ -2,6 +2,7 @@
 
 use crate::columns::{FREELY, STRICTLY, gains};
 use crate::error::SolveError;
+use crate::exposed::exposed;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::{LightField, NodeId, Transfer};
@@ -93,6 +94,10 @@ pub struct Solver<L: LightField = ()> {
     transfers: Vec<Vec<Transfer>>,
     /// By node, for leaves.
     placed: Vec<Placed>,
+    /// By node: for which links it was placed.
+    placed_for: Vec<u64>,
+    /// By node: the share of it that light may reach, see [`exposed`](crate::exposed).
+    exposed: Vec<f32>,
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
     /// diffuse light.
     pub(crate) faint: Vec<Rgb>,
@@ -154,6 +159,8 @@ impl<L: LightField> Solver<L> {
             own: Vec::new(),
             transfers: Vec::new(),
             placed: Vec::new(),
+            placed_for: Vec::new(),
+            exposed: Vec::new(),
             faint,
             strong,
             last_reflected: Vec::new(),
@@ -162,7 +169,7 @@ impl<L: LightField> Solver<L> {
             area,
         };
         solver.pull();
-        solver.stats.skipped.sealed_sides = solver.elements.sealed;
+        solver.stats.skipped.sealed_sides = solver.elements.sealed_sides();
         solver.stats.seconds.build = start.elapsed().as_secs_f64();
         Ok(solver)
     }
@@ -177,8 +184,8 @@ impl<L: LightField> Solver<L> {
             let goal = if last || stopped { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
             let most = if last || stopped { MOST_ITERATIONS } else { 3 };
             for iteration in 0..most {
-                // Once the light is there, and what is linked is nearly fine enough.
-                if iteration == 1 && pass + 2 >= PASSES.len() {
+                // Once the light is there, and what is linked is fine enough.
+                if iteration == 1 && pass + 1 >= PASSES.len() {
                     self.place();
                 }
                 let residual = self.iterate(pass >= FIRST_REFLECTED);
@@ -239,6 +246,7 @@ impl<L: LightField> Solver<L> {
         let count = self.elements.nodes.len();
         self.links = Links::new(refined.links, count);
         self.unlit = refined.unlit;
+        exposed(&self.scene, &self.elements, &mut self.exposed);
         self.incident.resize_with(count, L::Incident::default);
         self.stats.skipped += refined.skipped;
         self.stats.pairs += refined.pairs;
@@ -356,7 +364,11 @@ impl<L: LightField> Solver<L> {
                     node = elements.nodes[node as usize].parent;
                 }
                 let placed = self.placed.get(leaf as usize).copied().unwrap_or_default();
-                placed.irradiance(self.own[leaf as usize], inherited)
+                let exposed = self.exposed[leaf as usize];
+                if exposed <= 0.0 {
+                    return Rgb::ZERO;
+                }
+                placed.irradiance(self.own[leaf as usize], inherited) / exposed
             })
             .collect();
         for (leaf, sum) in leaves.into_iter().zip(sums) {
@@ -364,10 +376,15 @@ impl<L: LightField> Solver<L> {
         }
     }
 
-    /// Finds out what the places of the leaves make of the light on their ancestors.
+    /// Finds out what the places of the leaves make of the light on their ancestors, where links are new.
     fn place(&mut self) {
         let start = Instant::now();
-        self.placed = place(self.light(), &self.links);
+        let hashes = self.links.hashes(&self.elements);
+        let mut placed = std::mem::take(&mut self.placed);
+        let before = std::mem::replace(&mut self.placed_for, hashes);
+        let stale = |leaf: u32| before.get(leaf as usize) != Some(&self.placed_for[leaf as usize]);
+        place(self.light(), &self.links, self.settings.error, &self.exposed, stale, &mut placed);
+        self.placed = placed;
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 
