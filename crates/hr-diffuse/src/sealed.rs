@@ -18,6 +18,9 @@ use std::f32::consts::TAU;
 /// Rays per spot in successive rounds; only spots of groups that are still dark take part in the next one.
 const ROUNDS: [u32; 4] = [2, 6, 24, 96];
 
+/// Rays that all emitters' spots share, at first.
+const EMITTER_RAYS: u32 = 8192;
+
 /// Rays are confirmed by others that turn away from them by this (radians).
 const BESIDE: f32 = 2e-3;
 
@@ -42,21 +45,16 @@ type Side = u32;
 pub(crate) fn lit_sides(scene: &SceneData) -> Vec<[bool; 2]> {
     let count = scene.surfaces().len();
     let mut spots = Spots::new(scene);
-    let mut first = 0;
+    // What emitters see is lit; few rays from elsewhere would find a small one.
+    let emitters: Vec<u32> = (0..spots.all.len() as u32).filter(|&spot| spots.groups.is_lit(spot)).collect();
+    let rays = (EMITTER_RAYS / emitters.len().max(1) as u32).clamp(16, 256);
+    spots.explore(scene, &emitters, 0..rays);
+    let mut first = rays;
     for rays in ROUNDS {
         let dark: Vec<u32> = (0..spots.all.len() as u32)
             .filter(|&spot| reflects(scene, spots.all[spot as usize].side) && !spots.groups.is_lit(spot))
             .collect();
-        let seen: Vec<Seen> =
-            dark.par_iter().map(|&spot| look(scene, &spots.all[spot as usize], spot, first..first + rays)).collect();
-        for (&spot, seen) in dark.iter().zip(&seen) {
-            for met in &seen.met {
-                spots.join(scene, spot, met);
-            }
-            if seen.light {
-                spots.groups.light(spot);
-            }
-        }
+        spots.explore(scene, &dark, first..first + rays);
         first += rays;
     }
     let mut is_lit = |side: usize| spots.of_side[side].iter().any(|&spot| spots.groups.is_lit(spot));
@@ -153,6 +151,20 @@ impl Spots {
             }
         }
         spots
+    }
+
+    /// Joins spots to what rays from them meet.
+    fn explore(&mut self, scene: &SceneData, spots: &[u32], rays: std::ops::Range<u32>) {
+        let look = |&spot: &u32| look(scene, &self.all[spot as usize], spot, rays.clone());
+        let seen: Vec<Seen> = spots.par_iter().map(look).collect();
+        for (&spot, seen) in spots.iter().zip(&seen) {
+            for met in &seen.met {
+                self.join(scene, spot, met);
+            }
+            if seen.light {
+                self.groups.light(spot);
+            }
+        }
     }
 
     fn add(&mut self, spot: Spot, lit: bool) -> u32 {
