@@ -21,6 +21,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Solve scenes at several errors and compare their pictures with references: a Markdown table
     Accuracy(AccuracyArgs),
+    /// The diffuse solver's error over its time: a Markdown table, CSV and SVG
+    Curve(CurveArgs),
     /// Form factors against closed forms and brute force: a Markdown table
     FormFactors(FormFactorArgs),
     /// Rays per second on one thread: a Markdown table
@@ -109,6 +111,35 @@ pub struct AccuracyArgs {
     pub out: PathBuf,
 }
 
+/// Of `hr-bench curve`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct CurveArgs {
+    /// Scene files or names of built-in scenes
+    #[arg(value_name = "SCENE", required = true)]
+    pub scenes: Vec<String>,
+
+    /// Errors to ask for
+    #[arg(long, value_name = "E", value_delimiter = ',', default_values_t = [0.3, 0.2, 0.1, 0.05, 0.02, 0.01])]
+    pub errors: Vec<f32>,
+
+    /// Irradiances of triangles (object, mesh, triangle, area, cx, cy, cz, E_r, …, se_r, …, B_r, …); the first one for
+    /// the first scene, the second for the second, …
+    #[arg(long, value_name = "CSV", value_delimiter = ',')]
+    pub reference: Vec<PathBuf>,
+
+    /// Worker threads; 0 for all cores
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub threads: usize,
+
+    /// Solves of less than a second are done so often; the fastest counts
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    pub repeat: u32,
+
+    /// Where curve.csv and curve.svg go
+    #[arg(long, value_name = "DIR", default_value = "target/hr-bench")]
+    pub out: PathBuf,
+}
+
 /// Of `hr-bench form-factors`.
 #[derive(Clone, Debug, PartialEq, Args)]
 pub struct FormFactorArgs {
@@ -155,7 +186,13 @@ mod tests {
         assert_eq!(none.error, [0.2, 0.1, 0.05, 0.02], "default errors");
         let Ok(Command::Compare(two)) = read("compare a.pfm b.npy --below 3") else { panic!("two images") };
         assert_eq!((two.below, two.max_block), (Some(3.0), None), "bounds");
-        for wrong in ["", "compare a.pfm", "reference", "reference --image a.pfm --spp 0", "accuracy --error x"] {
+        let Ok(Command::Curve(curve)) = read("curve cornell --errors 0.2,0.1 --reference a.csv") else {
+            panic!("a scene")
+        };
+        assert_eq!((curve.errors, curve.threads), (vec![0.2, 0.1], 1), "errors, and one thread");
+        for wrong in
+            ["", "compare a.pfm", "reference", "reference --image a.pfm --spp 0", "accuracy --error x", "curve"]
+        {
             assert!(read(wrong).is_err(), "'{wrong}' was taken");
         }
     }

@@ -3,7 +3,7 @@
 use crate::args::{AccuracyArgs, Cli, Command, CompareArgs, ReferenceArgs, VisibilityArgs};
 use crate::compare::{compare, luminance};
 use crate::views::{Making, listed, path_traced};
-use crate::{BenchError, PathTracer, accuracy, float_image, form_factors, visibility};
+use crate::{BenchError, PathTracer, accuracy, curve, float_image, form_factors, visibility};
 use hr_scene::{Camera, ImageKind, Scene, ToneMap, builtin};
 use std::io::Write;
 use std::path::Path;
@@ -22,6 +22,7 @@ pub fn run(cli: &Cli, out: Out<'_>) -> Result<(), BenchError> {
         Command::Reference(args) => reference(args, out),
         Command::Compare(args) => compare_files(args, out),
         Command::Accuracy(args) => measure_accuracy(args, out),
+        Command::Curve(args) => curve::report(args, out),
         Command::FormFactors(args) => form_factors::report(args.samples, out),
         Command::Visibility(args) => measure_visibility(args, out),
     }
