@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::growth::Kind;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -23,6 +24,10 @@ pub enum Command {
     Accuracy(AccuracyArgs),
     /// The diffuse solver's error over its time: a Markdown table, CSV and SVG
     Curve(CurveArgs),
+    /// How time and memory grow with generated scenes: Markdown tables with fitted exponents
+    Growth(GrowthArgs),
+    /// One solve on 1, 2 and all threads, and whether the results are the same bits: a Markdown table
+    Threads(ThreadsArgs),
     /// Form factors against closed forms and brute force: a Markdown table
     FormFactors(FormFactorArgs),
     /// Rays per second on one thread: a Markdown table
@@ -140,6 +145,47 @@ pub struct CurveArgs {
     pub out: PathBuf,
 }
 
+/// Of `hr-bench growth`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct GrowthArgs {
+    /// What is generated; all kinds where none is given
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    pub kind: Vec<Kind>,
+
+    /// Polygons, about
+    #[arg(long, value_name = "N", value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000, 1_000_000],
+        value_parser = clap::value_parser!(u64).range(100..=100_000_000))]
+    pub sizes: Vec<u64>,
+
+    /// Error to ask for
+    #[arg(long, value_name = "E", default_value_t = 0.05)]
+    pub error: f32,
+
+    /// Worker threads; 0 for all cores
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub threads: usize,
+
+    /// Seconds after which a solve refines no more; it does not count for the exponents
+    #[arg(long, value_name = "S", default_value_t = 600)]
+    pub limit: u64,
+
+    /// Solve in this process and print JSON: what the others are started with
+    #[arg(long, hide = true)]
+    pub single: bool,
+}
+
+/// Of `hr-bench threads`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct ThreadsArgs {
+    /// A scene file or the name of a built-in scene
+    #[arg(value_name = "SCENE", default_value = hr_scene::builtin::DEFAULT)]
+    pub scene: String,
+
+    /// Error to ask for
+    #[arg(long, value_name = "E", default_value_t = 0.05)]
+    pub error: f32,
+}
+
 /// Of `hr-bench form-factors`.
 #[derive(Clone, Debug, PartialEq, Args)]
 pub struct FormFactorArgs {
@@ -190,9 +236,16 @@ mod tests {
             panic!("a scene")
         };
         assert_eq!((curve.errors, curve.threads), (vec![0.2, 0.1], 1), "errors, and one thread");
-        for wrong in
-            ["", "compare a.pfm", "reference", "reference --image a.pfm --spp 0", "accuracy --error x", "curve"]
-        {
+        for wrong in [
+            "",
+            "compare a.pfm",
+            "reference",
+            "reference --image a.pfm --spp 0",
+            "accuracy --error x",
+            "curve",
+            "growth --kind x",
+            "growth --sizes 3",
+        ] {
             assert!(read(wrong).is_err(), "'{wrong}' was taken");
         }
     }

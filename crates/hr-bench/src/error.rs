@@ -57,6 +57,9 @@ pub enum BenchError {
     /// The system gives no threads.
     #[error("cannot start threads: {0}")]
     Threads(String),
+    /// A process that was to solve a scene did not.
+    #[error("a process of its own: {0}")]
+    Process(String),
     /// Standard output is closed.
     #[error("standard output: {0}")]
     Output(std::io::Error),
