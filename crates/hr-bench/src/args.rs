@@ -169,6 +169,10 @@ pub struct GrowthArgs {
     #[arg(long, value_name = "S", default_value_t = 600)]
     pub limit: u64,
 
+    /// Renew visibility for values at vertices too, as for display
+    #[arg(long)]
+    pub vertices: bool,
+
     /// Solve in this process and print JSON: what the others are started with
     #[arg(long, hide = true)]
     pub single: bool,

@@ -9,7 +9,7 @@
 use crate::BenchError;
 use crate::args::CurveArgs;
 use crate::irradiance::{self, Agreement};
-use crate::measure::{Cost, solve};
+use crate::measure::{Cost, Extent, solve};
 use crate::plot::{Line, svg};
 use crate::run::{Out, say};
 use hr_diffuse::{Rgb, SceneInput, Solution};
@@ -56,7 +56,7 @@ pub fn report(args: &CurveArgs, out: Out<'_>) -> Result<(), BenchError> {
         )));
     }
     let mut csv = String::from(
-        "scene,error_asked,cpu_s,wall_s,vertices_s,leaves,links,rays,bytes,error_believed,radiosity_l1,irradiance_l1,\
+        "scene,error_asked,cpu_s,wall_s,vertices_cpu_s,leaves,links,rays,bytes,error_believed,radiosity_l1,irradiance_l1,\
          shown_l1,bias,reference_noise,finest_l1,renderpark_cpu_s\n",
     );
     let mut lines = Vec::new();
@@ -105,12 +105,12 @@ fn measure(
     args: &CurveArgs,
     reference: Option<&[irradiance::Triangle]>,
 ) -> Result<Point, BenchError> {
-    let (mut solution, mut cost) = solve(input, asked, args.threads, None)?;
+    let (mut solution, mut cost) = solve(input, asked, args.threads, Extent::FULL)?;
     for _ in 1..args.repeat {
         if cost.cpu >= FAST {
             break;
         }
-        let (again, faster) = solve(input, asked, args.threads, None)?;
+        let (again, faster) = solve(input, asked, args.threads, Extent::FULL)?;
         if faster.cpu < cost.cpu {
             (solution, cost) = (again, faster);
         }

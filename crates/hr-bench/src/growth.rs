@@ -7,7 +7,7 @@ pub use scenes::{Kind, scene};
 
 use crate::BenchError;
 use crate::args::GrowthArgs;
-use crate::measure::{Cost, solve};
+use crate::measure::{Cost, Extent, solve};
 use crate::run::{Out, say};
 use serde::{Deserialize, Serialize};
 use std::process::Command;
@@ -22,6 +22,7 @@ struct Row {
     rays: u64,
     cpu: f64,
     wall: f64,
+    phases: [f64; 3],
     vertices: f64,
     peak: u64,
     bytes: u64,
@@ -30,8 +31,8 @@ struct Row {
 
 impl From<Cost> for Row {
     fn from(cost: Cost) -> Self {
-        let Cost { polygons, leaves, links, rays, cpu, wall, vertices, peak, bytes, stopped, .. } = cost;
-        Self { polygons, leaves, links, rays, cpu, wall, vertices, peak, bytes, stopped }
+        let Cost { polygons, leaves, links, rays, cpu, wall, phases, vertices, peak, bytes, stopped, .. } = cost;
+        Self { polygons, leaves, links, rays, cpu, wall, phases, vertices, peak, bytes, stopped }
     }
 }
 
@@ -41,11 +42,11 @@ impl From<Cost> for Row {
 /// # Errors
 /// Where a scene cannot be solved, or a process not be started.
 pub fn report(args: &GrowthArgs, out: Out<'_>) -> Result<(), BenchError> {
-    let limit = Duration::from_secs(args.limit);
+    let extent = Extent { limit: Some(Duration::from_secs(args.limit)), vertices: args.vertices };
     let kinds = if args.kind.is_empty() { Kind::ALL.to_vec() } else { args.kind.clone() };
     if args.single {
         for (&kind, &size) in kinds.iter().zip(&args.sizes) {
-            let (_, cost) = solve(&scene(kind, size), args.error, args.threads, Some(limit))?;
+            let (_, cost) = solve(&scene(kind, size), args.error, args.threads, extent)?;
             say(out, &serde_json::to_string(&Row::from(cost)).map_err(|e| BenchError::Process(e.to_string()))?)?;
         }
         return Ok(());
@@ -54,10 +55,10 @@ pub fn report(args: &GrowthArgs, out: Out<'_>) -> Result<(), BenchError> {
         say(out, &format!("{kind}, error {}, {} threads (0: all cores)\n", args.error, args.threads))?;
         say(
             out,
-            "| polygons | leaves | links | links per leaf | rays | solve CPU s | solve wall s | vertices wall s | peak MB | \
+            "| polygons | leaves | links | links per leaf | rays | solve CPU s | solve wall s | build, refine, transport wall s | vertices CPU s | peak MB | \
              bytes of peak per link | nodes and links MB |",
         )?;
-        say(out, &format!("|{}", " ---: |".repeat(11)))?;
+        say(out, &format!("|{}", " ---: |".repeat(12)))?;
         let mut rows = Vec::new();
         for &size in &args.sizes {
             match child(kind, size, args) {
@@ -92,7 +93,7 @@ type Measure = fn(&Row) -> f64;
 /// What exponents are fitted to.
 const MEASURES: [(&str, Measure); 4] = [
     ("solve CPU time", |row| row.cpu),
-    ("vertices wall time", |row| row.vertices),
+    ("vertices CPU time", |row| row.vertices),
     ("peak memory", |row| row.peak as f64),
     ("links", |row| row.links as f64),
 ];
@@ -109,7 +110,8 @@ fn child(kind: Kind, size: u64, args: &GrowthArgs) -> Result<Row, BenchError> {
         ("--limit", args.limit.to_string()),
     ];
     let words = options.iter().flat_map(|(option, value)| [*option, value]);
-    let done = Command::new(program).args(["growth", "--single"]).args(words).output();
+    let vertices = args.vertices.then_some("--vertices");
+    let done = Command::new(program).args(["growth", "--single"]).args(words).args(vertices).output();
     let done = done.map_err(|error| wrong(error.to_string()))?;
     if !done.status.success() {
         let said = String::from_utf8_lossy(&done.stderr);
@@ -121,7 +123,7 @@ fn child(kind: Kind, size: u64, args: &GrowthArgs) -> Result<Row, BenchError> {
 fn text(row: &Row) -> String {
     let (links, megabytes) = (row.links.max(1) as f64, |bytes: u64| bytes as f64 * 1e-6);
     format!(
-        "| {} | {} | {} | {:.1} | {} | {:.2}{} | {:.2} | {:.2} | {:.1} | {:.0} | {:.1} |",
+        "| {} | {} | {} | {:.1} | {} | {:.2}{} | {:.2} | {:.2}, {:.2}, {:.2} | {:.2} | {:.1} | {:.0} | {:.1} |",
         row.polygons,
         row.leaves,
         row.links,
@@ -130,6 +132,9 @@ fn text(row: &Row) -> String {
         row.cpu,
         if row.stopped { " (stopped)" } else { "" },
         row.wall,
+        row.phases[0],
+        row.phases[1],
+        row.phases[2],
         row.vertices,
         megabytes(row.peak),
         row.peak as f64 / links,
@@ -164,12 +169,19 @@ mod tests {
 
     #[test]
     fn a_process_tells_its_size() {
-        let args =
-            GrowthArgs { kind: vec![Kind::City], sizes: vec![100], error: 0.5, threads: 1, limit: 100, single: true };
+        let args = GrowthArgs {
+            kind: vec![Kind::City],
+            sizes: vec![100],
+            error: 0.5,
+            threads: 1,
+            limit: 100,
+            vertices: false,
+            single: true,
+        };
         let mut said = Vec::new();
         report(&args, &mut said).expect("sound");
         let row: Row = serde_json::from_slice(&said).expect("JSON");
         assert!(row.polygons == 100 && row.links > 0 && !row.stopped, "{row:?}");
-        assert_eq!(text(&row).matches('|').count(), 12, "a row of the table: {}", text(&row));
+        assert_eq!(text(&row).matches('|').count(), 13, "a row of the table: {}", text(&row));
     }
 }

@@ -327,7 +327,7 @@ fn area_and_middle(polygon: &[DVec2]) -> (f64, DVec2) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::solve;
+    use crate::measure::{Extent, solve};
 
     const HEADER: &str = "object,mesh,triangle,material,area,cx,cy,cz,E_r,E_g,E_b,se_r,se_g,se_b,B_r,B_g,B_b\n";
 
@@ -397,7 +397,7 @@ mod tests {
             materials: vec![material(0.5, 0.0), material(0.0, 10.0)],
             ..Default::default()
         };
-        let (solution, cost) = solve(&input, 0.05, 1, None).expect("sound");
+        let (solution, cost) = solve(&input, 0.05, 1, Extent::FULL).expect("sound");
         assert!(cost.leaves > 8, "there is something to add up: {cost:?}");
         let [a, b, c, d] = floor.map(DVec3::from);
         let [e, f, g, _] = lamp.map(DVec3::from);

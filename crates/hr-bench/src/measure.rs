@@ -14,8 +14,12 @@ pub struct Cost {
     pub cpu: f64,
     /// Seconds by the clock, of the same.
     pub wall: f64,
-    /// Seconds by the clock for values at vertices.
+    /// Seconds of processor time for values at vertices.
     pub vertices: f64,
+    /// Seconds by the clock, of the same.
+    pub vertices_wall: f64,
+    /// Seconds by the clock of the hierarchy, of refinement and of transport.
+    pub phases: [f64; 3],
     /// Surfaces handed in.
     pub polygons: u64,
     /// Nodes of the hierarchy.
@@ -34,6 +38,20 @@ pub struct Cost {
     pub believed: f32,
     /// Whether it was stopped because of the time.
     pub stopped: bool,
+}
+
+/// When a solve ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Nothing is refined any more after this long.
+    pub limit: Option<Duration>,
+    /// Whether visibility is renewed for values at vertices; if not, what links know of it is taken.
+    pub vertices: bool,
+}
+
+impl Extent {
+    /// All there is to do.
+    pub const FULL: Self = Self { limit: None, vertices: true };
 }
 
 /// Seconds of processor time, of all threads, that the process has used; where the system does not tell, NaN.
@@ -56,16 +74,11 @@ pub fn bytes(nodes: u64, links: u64) -> u64 {
     nodes * (size_of::<Element>() + light) as u64 + links * size_of::<Link>() as u64
 }
 
-/// Solves the diffuse light in a scene on `threads` threads (0: all cores), refining no more after `limit`.
+/// Solves the diffuse light in a scene on `threads` threads (0: all cores).
 ///
 /// # Errors
 /// Where the scene cannot be solved, or the system gives no threads.
-pub fn solve(
-    input: &SceneInput,
-    error: f32,
-    threads: usize,
-    limit: Option<Duration>,
-) -> Result<(Solution, Cost), BenchError> {
+pub fn solve(input: &SceneInput, error: f32, threads: usize, extent: Extent) -> Result<(Solution, Cost), BenchError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| BenchError::Threads(error.to_string()))?;
     pool.install(|| {
@@ -74,7 +87,7 @@ pub fn solve(
         let mut solver = Solver::new(input, Settings { error }, ())?;
         solver.solve(&mut |progress| {
             believed = progress.error;
-            if limit.is_some_and(|limit| start.elapsed() > limit) {
+            if extent.limit.is_some_and(|limit| start.elapsed() > limit) {
                 stopped = true;
                 return ControlFlow::Break(());
             }
@@ -82,14 +95,16 @@ pub fn solve(
         });
         let (cpu, wall) = (cpu_seconds() - cpu, start.elapsed().as_secs_f64());
         let peak = hr_view::stats::peak_bytes().unwrap_or(0);
-        let start = Instant::now();
-        let going_on = if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let (start, before) = (Instant::now(), cpu_seconds());
+        let going_on = if stopped || !extent.vertices { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         let solution = solver.finish(&mut |_| going_on);
         let stats = &solution.stats;
         let cost = Cost {
             cpu,
             wall,
-            vertices: start.elapsed().as_secs_f64(),
+            vertices: cpu_seconds() - before,
+            vertices_wall: start.elapsed().as_secs_f64(),
+            phases: [stats.seconds.build, stats.seconds.refine, stats.seconds.transport],
             polygons: stats.polygons,
             nodes: stats.nodes,
             leaves: stats.leaves,
@@ -113,14 +128,15 @@ mod tests {
     #[test]
     fn costs_are_those_of_the_solution() {
         let input = Arc::new(Scene::load("cornell").expect("built in")).input();
-        let (solution, cost) = solve(&input, 0.5, 1, None).expect("sound");
+        let (solution, cost) = solve(&input, 0.5, 1, Extent::FULL).expect("sound");
         assert_eq!(cost.links, solution.links.all().len() as u64, "links");
         assert_eq!(cost.leaves, solution.elements.patch_leaves().count() as u64, "leaves");
         assert!(cost.bytes > 16 * cost.links && !cost.stopped, "{cost:?}");
         assert!((0.5..0.55).contains(&cost.believed), "what was asked for, and what is still on its way: {cost:?}");
-        let (_, stopped) = solve(&input, 0.01, 1, Some(Duration::ZERO)).expect("sound");
+        let at_once = Extent { limit: Some(Duration::ZERO), vertices: false };
+        let (_, stopped) = solve(&input, 0.01, 1, at_once).expect("sound");
         assert!(stopped.stopped && stopped.leaves > 0, "{stopped:?}");
-        assert!(solve(&input, 7.0, 1, None).is_err(), "no such error");
+        assert!(solve(&input, 7.0, 1, Extent::FULL).is_err(), "no such error");
     }
 
     #[test]

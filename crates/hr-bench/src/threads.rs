@@ -1,7 +1,7 @@
 //! What more threads bring, and whether they change anything.
 
 use crate::BenchError;
-use crate::measure::solve;
+use crate::measure::{Extent, solve};
 use crate::run::{Out, say};
 use hr_diffuse::{SceneInput, Solution};
 
@@ -20,9 +20,9 @@ pub fn report(name: &str, input: &SceneInput, error: f32, out: Out<'_>) -> Resul
     let mut first: Option<(u64, f64, f64)> = None;
     let mut different = Vec::new();
     for threads in counts {
-        let (solution, cost) = solve(input, error, threads, None)?;
+        let (solution, cost) = solve(input, error, threads, Extent::FULL)?;
         let bits = fingerprint(&solution);
-        let (right, wall, vertices) = *first.get_or_insert((bits, cost.wall, cost.vertices));
+        let (right, wall, vertices) = *first.get_or_insert((bits, cost.wall, cost.vertices_wall));
         if bits != right {
             different.push(threads.to_string());
         }
@@ -31,8 +31,8 @@ pub fn report(name: &str, input: &SceneInput, error: f32, out: Out<'_>) -> Resul
             cost.cpu,
             cost.wall,
             wall / cost.wall.max(1e-9),
-            cost.vertices,
-            vertices / cost.vertices.max(1e-9),
+            cost.vertices_wall,
+            vertices / cost.vertices_wall.max(1e-9),
             if bits == right { "yes" } else { "NO" }
         );
         say(out, &line)?;
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn a_single_bit_is_noticed() {
         let input = Arc::new(Scene::load("cornell").expect("built in")).input();
-        let (mut solution, _) = solve(&input, 0.8, 1, None).expect("sound");
+        let (mut solution, _) = solve(&input, 0.8, 1, Extent::FULL).expect("sound");
         let before = fingerprint(&solution);
         let last = solution.exitant.radiosity.last_mut().expect("nodes");
         last.z = f32::from_bits(last.z.to_bits() ^ 1);

@@ -197,7 +197,7 @@ fn heap(size: u64) -> Vec<Surface> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::solve;
+    use crate::measure::{Extent, solve};
 
     #[test]
     fn sizes_are_about_those_asked_for() {
@@ -214,7 +214,7 @@ mod tests {
     #[test]
     fn fronts_are_where_the_light_is() {
         for kind in Kind::ALL {
-            let (solution, _) = solve(&scene(kind, 300), 0.5, 1, None).expect("sound");
+            let (solution, _) = solve(&scene(kind, 300), 0.5, 1, Extent::FULL).expect("sound");
             let (mut lit, mut area) = (0.0, 0.0);
             for leaf in solution.elements.patch_leaves() {
                 let element = &solution.elements.nodes[leaf as usize];
