@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::growth::Kind;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -21,6 +22,12 @@ pub enum Command {
     Compare(CompareArgs),
     /// Solve scenes at several errors and compare their pictures with references: a Markdown table
     Accuracy(AccuracyArgs),
+    /// The diffuse solver's error over its time: a Markdown table, CSV and SVG
+    Curve(CurveArgs),
+    /// How time and memory grow with generated scenes: Markdown tables with fitted exponents
+    Growth(GrowthArgs),
+    /// One solve on 1, 2 and all threads, and whether the results are the same bits: a Markdown table
+    Threads(ThreadsArgs),
     /// Form factors against closed forms and brute force: a Markdown table
     FormFactors(FormFactorArgs),
     /// Rays per second on one thread: a Markdown table
@@ -109,6 +116,80 @@ pub struct AccuracyArgs {
     pub out: PathBuf,
 }
 
+/// Of `hr-bench curve`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct CurveArgs {
+    /// Scene files or names of built-in scenes
+    #[arg(value_name = "SCENE", required = true)]
+    pub scenes: Vec<String>,
+
+    /// Errors to ask for
+    #[arg(long, value_name = "E", value_delimiter = ',', default_values_t = [0.3, 0.2, 0.1, 0.05, 0.02, 0.01])]
+    pub errors: Vec<f32>,
+
+    /// Irradiances of triangles (object, mesh, triangle, area, cx, cy, cz, E_r, …, se_r, …, B_r, …); the first one for
+    /// the first scene, the second for the second, …
+    #[arg(long, value_name = "CSV", value_delimiter = ',')]
+    pub reference: Vec<PathBuf>,
+
+    /// Worker threads; 0 for all cores
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub threads: usize,
+
+    /// Solves of less than a second are done so often; the fastest counts
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    pub repeat: u32,
+
+    /// Where curve.csv and curve.svg go
+    #[arg(long, value_name = "DIR", default_value = "target/hr-bench")]
+    pub out: PathBuf,
+}
+
+/// Of `hr-bench growth`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct GrowthArgs {
+    /// What is generated; all kinds where none is given
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    pub kind: Vec<Kind>,
+
+    /// Polygons, about
+    #[arg(long, value_name = "N", value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000, 1_000_000],
+        value_parser = clap::value_parser!(u64).range(100..=100_000_000))]
+    pub sizes: Vec<u64>,
+
+    /// Error to ask for
+    #[arg(long, value_name = "E", default_value_t = 0.05)]
+    pub error: f32,
+
+    /// Worker threads; 0 for all cores
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub threads: usize,
+
+    /// Seconds after which a solve refines no more; it does not count for the exponents
+    #[arg(long, value_name = "S", default_value_t = 600)]
+    pub limit: u64,
+
+    /// Renew visibility for values at vertices too, as for display
+    #[arg(long)]
+    pub vertices: bool,
+
+    /// Solve in this process and print JSON: what the others are started with
+    #[arg(long, hide = true)]
+    pub single: bool,
+}
+
+/// Of `hr-bench threads`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct ThreadsArgs {
+    /// A scene file or the name of a built-in scene
+    #[arg(value_name = "SCENE", default_value = hr_scene::builtin::DEFAULT)]
+    pub scene: String,
+
+    /// Error to ask for
+    #[arg(long, value_name = "E", default_value_t = 0.05)]
+    pub error: f32,
+}
+
 /// Of `hr-bench form-factors`.
 #[derive(Clone, Debug, PartialEq, Args)]
 pub struct FormFactorArgs {
@@ -155,7 +236,20 @@ mod tests {
         assert_eq!(none.error, [0.2, 0.1, 0.05, 0.02], "default errors");
         let Ok(Command::Compare(two)) = read("compare a.pfm b.npy --below 3") else { panic!("two images") };
         assert_eq!((two.below, two.max_block), (Some(3.0), None), "bounds");
-        for wrong in ["", "compare a.pfm", "reference", "reference --image a.pfm --spp 0", "accuracy --error x"] {
+        let Ok(Command::Curve(curve)) = read("curve cornell --errors 0.2,0.1 --reference a.csv") else {
+            panic!("a scene")
+        };
+        assert_eq!((curve.errors, curve.threads), (vec![0.2, 0.1], 1), "errors, and one thread");
+        for wrong in [
+            "",
+            "compare a.pfm",
+            "reference",
+            "reference --image a.pfm --spp 0",
+            "accuracy --error x",
+            "curve",
+            "growth --kind x",
+            "growth --sizes 3",
+        ] {
             assert!(read(wrong).is_err(), "'{wrong}' was taken");
         }
     }

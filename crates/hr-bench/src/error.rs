@@ -46,6 +46,20 @@ pub enum BenchError {
     /// Two images cannot be compared.
     #[error("cannot compare: {0}")]
     Compare(String),
+    /// A file cannot be written.
+    #[error("{path}: cannot be written: {source}", path = path.display())]
+    Write {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The system gives no threads.
+    #[error("cannot start threads: {0}")]
+    Threads(String),
+    /// A process that was to solve a scene did not.
+    #[error("a process of its own: {0}")]
+    Process(String),
     /// Standard output is closed.
     #[error("standard output: {0}")]
     Output(std::io::Error),

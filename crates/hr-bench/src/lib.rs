@@ -1,14 +1,31 @@
 //! What the library is measured by: a reference path tracer, distances between images, and reports of accuracy and
 //! speed. Not published; the `hr-bench` command is its face.
+//!
+//! | subcommand | what it measures |
+//! | --- | --- |
+//! | `reference` | nothing: it path traces a reference image |
+//! | `compare` | distance of an image to a reference |
+//! | `accuracy` | pictures of solutions against references |
+//! | `curve` | the diffuse solver's error over its time, against reference irradiances and its own finest solution |
+//! | `growth` | time and memory of generated scenes over their size |
+//! | `threads` | what more threads bring, and that they change nothing |
+//! | `form-factors` | form factors against closed forms and brute force |
+//! | `visibility` | rays per second |
 
 pub mod accuracy;
 pub mod args;
 pub mod compare;
+pub mod curve;
 pub mod error;
 pub mod float_image;
 pub mod form_factors;
+pub mod growth;
+pub mod irradiance;
+pub mod measure;
 pub mod path_tracer;
+pub mod plot;
 pub mod run;
+pub mod threads;
 pub mod views;
 pub mod visibility;
 

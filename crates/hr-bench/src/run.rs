@@ -1,9 +1,9 @@
 //! What the subcommands do.
 
-use crate::args::{AccuracyArgs, Cli, Command, CompareArgs, ReferenceArgs, VisibilityArgs};
+use crate::args::{AccuracyArgs, Cli, Command, CompareArgs, ReferenceArgs, ThreadsArgs, VisibilityArgs};
 use crate::compare::{compare, luminance};
 use crate::views::{Making, listed, path_traced};
-use crate::{BenchError, PathTracer, accuracy, float_image, form_factors, visibility};
+use crate::{BenchError, PathTracer, accuracy, curve, float_image, form_factors, growth, threads, visibility};
 use hr_scene::{Camera, ImageKind, Scene, ToneMap, builtin};
 use std::io::Write;
 use std::path::Path;
@@ -22,6 +22,9 @@ pub fn run(cli: &Cli, out: Out<'_>) -> Result<(), BenchError> {
         Command::Reference(args) => reference(args, out),
         Command::Compare(args) => compare_files(args, out),
         Command::Accuracy(args) => measure_accuracy(args, out),
+        Command::Curve(args) => curve::report(args, out),
+        Command::Growth(args) => growth::report(args, out),
+        Command::Threads(args) => measure_threads(args, out),
         Command::FormFactors(args) => form_factors::report(args.samples, out),
         Command::Visibility(args) => measure_visibility(args, out),
     }
@@ -103,4 +106,9 @@ fn measure_visibility(args: &VisibilityArgs, out: Out<'_>) -> Result<(), BenchEr
     let scene = Arc::new(Scene::load(&args.scene)?);
     let camera = camera(&scene, None)?;
     visibility::report(&PathTracer::new(scene)?, &camera, args.rays, out)
+}
+
+fn measure_threads(args: &ThreadsArgs, out: Out<'_>) -> Result<(), BenchError> {
+    let scene = Arc::new(Scene::load(&args.scene)?);
+    threads::report(&scene.name, &scene.input(), args.error, out)
 }

@@ -66,7 +66,8 @@ pub fn stats(solved: &Solved, asked: f32, error: f32, times: &Times) -> Value {
 }
 
 /// The most memory that the process has had so far; `None` where the system does not tell.
-fn peak_bytes() -> Option<u64> {
+#[must_use]
+pub fn peak_bytes() -> Option<u64> {
     // Linux: "VmHWM:    12345 kB".
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
