@@ -246,8 +246,8 @@ pub struct Accuracy {
     pub relative: f64,
     /// Absolute error, 0 or more.
     pub absolute: f64,
-    /// Evaluations of the integrand after which what there is must do. Below 64 the four parts of a receiver are the
-    /// last resort.
+    /// Evaluations of the integrand after which what there is must do. Below 64 the parts of a receiver, four points each,
+    /// are the last resort.
     pub most: u32,
 }
 
@@ -440,7 +440,8 @@ pub fn mean_factor(
         let (value, _) = at(geometry.middle(domain).as_dvec2());
         return Mean { value, error: value * (reach * reach).min(1.0), evaluations };
     }
-    if reach < 1.0 || accuracy.most < COARSE {
+    let coarse = accuracy.most < COARSE;
+    if reach < if coarse { 0.5 } else { 1.0 } {
         let (mut value, mut weight) = (0.0, 0.0);
         let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
         let mut add = |uv: DVec2, share: f64| {
@@ -452,23 +453,24 @@ pub fn mean_factor(
         low_rule(geometry, domain, &mut add);
         let mean = value / weight;
         // Four points follow what is linear; the rest is a share of what they differ by.
-        let error = 0.25 * (high - low) * reach.min(1.0);
-        if error <= (accuracy.relative * mean).max(accuracy.absolute) {
+        let error = 0.25 * (high - low) * reach;
+        if coarse || error <= (accuracy.relative * mean).max(accuracy.absolute) {
             return Mean { value: mean, error, evaluations };
         }
-        if accuracy.most < COARSE {
-            (value, weight) = (0.0, 0.0);
-            let mut add = |uv: DVec2, share: f64| {
-                let (found, jacobian) = at(uv);
-                value += share * jacobian * found;
-                weight += share * jacobian;
-            };
-            for part in geometry.split(domain) {
-                low_rule(geometry, part, &mut add);
-            }
-            let finer = value / weight;
-            return Mean { value: finer, error: (finer - mean).abs(), evaluations };
+    }
+    if coarse {
+        let (mut value, mut weight) = (0.0, 0.0);
+        let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
+        let mut add = |uv: DVec2, share: f64| {
+            let (found, jacobian) = at(uv);
+            value += share * jacobian * found;
+            weight += share * jacobian;
+            (low, high) = (low.min(found), high.max(found));
+        };
+        for part in geometry.split(domain) {
+            low_rule(geometry, part, &mut add);
         }
+        return Mean { value: value / weight, error: 0.0625 * (high - low), evaluations };
     }
     let area = f64::from(geometry.area(domain));
     let accuracy = Accuracy { absolute: accuracy.absolute * area, ..accuracy };

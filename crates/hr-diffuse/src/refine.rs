@@ -29,11 +29,11 @@ const RADIOSITY_SHARE: f32 = 0.5;
 /// see the peak of a narrow lobe.
 const DIRECTIONAL_SHARE: f32 = 0.05;
 /// Share of a link's tolerance that its factor may be wrong by, …
-const FACTOR_SHARE: f32 = 0.02;
+const FACTOR_SHARE: f32 = 0.05;
 /// … least and most that may be relative to the factor, …
-const FACTOR_ERROR: [f32; 2] = [0.005, 0.03];
+const FACTOR_ERROR: [f32; 2] = [0.02, 0.1];
 /// … and points of the receiver that it is worth.
-const FACTOR_POINTS: u32 = 20;
+const FACTOR_POINTS: u32 = 16;
 /// Segments per link: first a few, then as many as its light is worth.
 const FIRST_SEGMENTS: u32 = 4;
 const MOST_SEGMENTS: u32 = 32;
