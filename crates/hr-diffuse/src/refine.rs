@@ -5,7 +5,7 @@
 //! not depend on the number of threads.
 
 use crate::Rgb;
-use crate::geometry::Domain;
+use crate::form_factor::{self, Accuracy, Part};
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
 use crate::links::Link;
@@ -13,7 +13,7 @@ use crate::oracle::{FactorBounds, factor_bounds};
 use crate::segments;
 use crate::stats::Skipped;
 use crate::transport::{Exitant, Light};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
@@ -28,6 +28,12 @@ const RADIOSITY_SHARE: f32 = 0.5;
 /// The same where it stems from the sender's directional distribution: of the directions that lead to a receiver few
 /// see the peak of a narrow lobe.
 const DIRECTIONAL_SHARE: f32 = 0.05;
+/// Share of a link's tolerance that its factor may be wrong by, …
+const FACTOR_SHARE: f32 = 0.05;
+/// … least and most that may be relative to the factor, …
+const FACTOR_ERROR: [f32; 2] = [0.02, 0.1];
+/// … and points of the receiver that it is worth.
+const FACTOR_POINTS: u32 = 16;
 /// Segments per link: first a few, then as many as its light is worth.
 const FIRST_SEGMENTS: u32 = 4;
 const MOST_SEGMENTS: u32 = 32;
@@ -285,8 +291,15 @@ fn decide<L: LightField>(
     if let Some(link) = old {
         return Verdict::Keep(link);
     }
-    let mut link =
-        Link { receiver: pair.receiver, sender: pair.sender, factor: mean_factor(light, pair), visibility: 0.0 };
+    // A faint link's factor need not be accurate; no later pass renews it.
+    let relative = (FACTOR_SHARE * tolerance.error / (weight * interval.most).max(f32::MIN_POSITIVE))
+        .clamp(FACTOR_ERROR[0], FACTOR_ERROR[1]);
+    let mut link = Link {
+        receiver: pair.receiver,
+        sender: pair.sender,
+        factor: mean_factor(light, pair, relative),
+        visibility: 0.0,
+    };
     if link.factor <= 0.0 && bounds.max > 0.0 && !stopped {
         // The sampled points did not face each other, though some may: no light worth splitting for.
         link.visibility = 1.0;
@@ -366,8 +379,8 @@ fn choose<L: LightField>(
     }
 }
 
-/// Unoccluded factor of a link, averaged over points of a flat receiver.
-fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair) -> f32 {
+/// Unoccluded factor of a link: the mean over a flat receiver, to a relative error.
+fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) -> f32 {
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
     let direction = light.direction_to(r.center, pair.sender);
     let distance = r.center.distance(s.center);
@@ -385,20 +398,13 @@ fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair) -> f32 {
         return factor_at(r.center, direction);
     }
     let normal = r.normals.axis;
-    if r.radius < 0.05 * (distance - s.radius) {
-        return factor_at(r.center, normal);
-    }
+    let clear = distance - s.radius;
+    let reach = if clear > 0.0 { r.radius / clear } else { f32::INFINITY };
     let geometry = &light.scene.surfaces()[r.source as usize];
-    let over = |part: Domain| -> f32 {
-        let at = |&(uv, w): &(Vec2, f32)| w * factor_at(geometry.point(uv), normal);
-        geometry.quadrature(part).iter().map(at).sum()
-    };
-    if distance - s.radius > 2.0 * r.radius {
-        return over(r.domain);
-    }
-    // Near its sender the factor bends more than four points can follow.
-    let parts = geometry.split(r.domain);
-    parts.iter().map(|&part| over(part) * geometry.area(part)).sum::<f32>() / r.area
+    let receiver = Part { geometry, domain: r.domain, back: r.kind == Kind::Back };
+    let accuracy = Accuracy { relative: f64::from(relative), absolute: 0.0, most: FACTOR_POINTS };
+    let factor = |x: DVec3, _| f64::from(factor_at(x.as_vec3(), normal));
+    form_factor::mean_factor(receiver, accuracy, f64::from(reach), factor).value as f32
 }
 
 /// Irradiance that a link would carry unoccluded (max channel).

@@ -27,7 +27,7 @@ pub use polygon::{Quad, Triangle};
 pub use revolution::{Profile, Revolution};
 
 use crate::{Cone, Shape, Surface};
-use glam::{Vec2, Vec3, vec2};
+use glam::{DVec2, DVec3, Vec2, Vec3, vec2};
 use smallvec::{SmallVec, smallvec};
 
 /// A piece that is longer than this many times its width is split across its length only.
@@ -58,6 +58,14 @@ impl Domain {
     #[must_use]
     pub fn lerp(&self, s: f32, t: f32) -> Vec2 {
         vec2(self.u0 + (self.u1 - self.u0) * s, self.v0 + (self.v1 - self.v0) * t)
+    }
+
+    /// Four similar parts of a triangle's, the middle one last.
+    pub(crate) fn quarter_triangle(&self) -> SmallVec<[Self; 4]> {
+        let Self { u0, v0, u1, v1 } = *self;
+        let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
+        let part = |u0, v0, u1, v1| Self { u0, v0, u1, v1 };
+        smallvec![part(u0, v0, u, v), part(u, v0, u1, v), part(u0, v, u, v1), part(u, v, u0, v0)]
     }
 
     /// Area of the rectangle between the corners, in parameter space.
@@ -129,6 +137,25 @@ impl Geometry {
             Self::Triangle(triangle) => 2.0 * triangle.area(),
             Self::Quad(quad) => quad.jacobian(uv),
             Self::Revolution(revolution) => revolution.jacobian(uv),
+        }
+    }
+
+    /// [`point`](Self::point), [`normal`](Self::normal) and [`jacobian`](Self::jacobian) in double precision.
+    #[must_use]
+    pub fn place(&self, uv: DVec2) -> (DVec3, DVec3, f64) {
+        match self {
+            Self::Triangle(triangle) => {
+                let [p0, p1, p2] = triangle.points().map(|p| p.as_dvec3());
+                let (e, f) = (p1 - p0, p2 - p0);
+                (p0 + e * uv.x + f * uv.y, triangle.normal().as_dvec3(), e.cross(f).length())
+            }
+            Self::Quad(quad) => {
+                let [p0, p1, p2, p3] = quad.points().map(|p| p.as_dvec3());
+                let (along_u, along_v) = ((p1 - p0).lerp(p2 - p3, uv.y), (p3 - p0).lerp(p2 - p1, uv.x));
+                let point = p0.lerp(p1, uv.x).lerp(p3.lerp(p2, uv.x), uv.y);
+                (point, quad.normal().as_dvec3(), along_u.cross(along_v).length())
+            }
+            Self::Revolution(revolution) => revolution.place(uv),
         }
     }
 
@@ -223,9 +250,7 @@ impl Geometry {
         let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
         let part = |u0, v0, u1, v1| Domain { u0, v0, u1, v1 };
         let (cut_u, cut_v) = match self {
-            Self::Triangle(_) => {
-                return smallvec![part(u0, v0, u, v), part(u, v0, u1, v), part(u0, v, u, v1), part(u, v, u0, v0)];
-            }
+            Self::Triangle(_) => return domain.quarter_triangle(),
             Self::Quad(quad) => cuts(quad.extent(domain)),
             Self::Revolution(revolution) => {
                 // Pieces that go far around are bent, not long: one cut at a time, the axis first.

@@ -250,6 +250,30 @@ impl Revolution {
         TAU * self.profile_point(uv.y).x * self.profile_length()
     }
 
+    /// Point, unit front normal and Jacobian at (u, v) in double precision.
+    pub(super) fn place(&self, uv: DVec2) -> (DVec3, DVec3, f64) {
+        let full = std::f64::consts::TAU;
+        let [x, y, z] = self.frame.map(|v| v.as_dvec3());
+        let (sin, cos) = (uv.x * full).sin_cos();
+        let away = x * cos + y * sin;
+        let (profile, normal, length) = match self.profile {
+            Profile::Line { from, to } => {
+                let (from, to) = (from.as_dvec2(), to.as_dvec2());
+                let along = to - from;
+                (from + along * uv.y, DVec2::new(along.y, -along.x) / along.length(), along.length())
+            }
+            Profile::Arc { center, radius, start, sweep } => {
+                let (sweep, radius) = (f64::from(sweep), f64::from(radius));
+                let (sin, cos) = ((f64::from(start) + sweep * uv.y) * full).sin_cos();
+                let normal = DVec2::new(cos, sin);
+                (DVec2::new(f64::from(center), 0.0) + normal * radius, normal, full * radius * sweep.abs())
+            }
+        };
+        let point = self.center.as_dvec3() + away * profile.x + z * profile.y;
+        let front = (away * normal.x + z * normal.y) * f64::from(self.side);
+        (point, front.normalize(), full * profile.x.abs() * length)
+    }
+
     /// Share of a full turn that a part goes around the axis and around the profile's centre.
     pub(super) fn turns(&self, domain: Domain) -> (f32, f32) {
         let along = match self.profile {
