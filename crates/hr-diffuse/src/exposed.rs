@@ -16,15 +16,15 @@ const RAYS: u32 = 3;
 /// Less than this share of a leaf is taken for so much: what little is there is known too badly.
 const LEAST: f32 = 0.2;
 
-/// By node: the share of its area that light may reach, 1 for all but leaves that are flat; 0 for wholly covered ones.
-/// Keeps what `known` has already.
-pub(crate) fn exposed(scene: &SceneData, elements: &Elements, known: &mut Vec<f32>) {
-    let new: Vec<f32> = (known.len() as u32..elements.nodes.len() as u32)
+/// Finds the shares of new nodes' areas that light may reach: 1 for all but leaves that are flat, 0 for wholly covered ones.
+pub(crate) fn expose(scene: &SceneData, elements: &mut Elements) {
+    let known = elements.exposed.len() as u32;
+    let new: Vec<f32> = (known..elements.nodes.len() as u32)
         .into_par_iter()
         .with_min_len(64)
         .map(|node| exposed_share(scene, elements, node))
         .collect();
-    known.extend(new);
+    elements.exposed.extend(new);
 }
 
 fn exposed_share(scene: &SceneData, elements: &Elements, leaf: u32) -> f32 {

@@ -168,6 +168,8 @@ pub struct Elements {
     pub facets: Vec<[Facet; FACETS]>,
     /// Sides of surfaces left out because no light can reach them: front and back of each.
     sealed: Vec<[bool; 2]>,
+    /// By node: see [`exposed`](Self::exposed).
+    pub(crate) exposed: Vec<f32>,
 }
 
 struct Boxed(obvhs::aabb::Aabb);
@@ -209,12 +211,20 @@ impl Elements {
             surface_nodes: vec![[u32::MAX; 2]; scene.surfaces().len()],
             facets: Vec::new(),
             sealed,
+            exposed: Vec::new(),
         };
         elements.flatten(root);
         for node in 0..elements.nodes.len() {
             elements.add_facets(scene, node);
         }
         elements
+    }
+
+    /// Share of a leaf's area that light may reach: the rest lies below something that stands on it. The leaf's irradiance
+    /// and radiosity are those of this part.
+    #[must_use]
+    pub fn exposed(&self, leaf: u32) -> f32 {
+        self.exposed.get(leaf as usize).copied().unwrap_or(1.0)
     }
 
     /// Whether no light can reach a surface's front or back, which would reflect it.

@@ -102,13 +102,11 @@ impl Placed {
     }
 }
 
-/// Places the leaves that are `stale`, to the error asked for; by node. The others keep what they have. `exposed`
-/// is the share of each that is not covered.
+/// Places the leaves that are `stale`, to the error asked for; by node. The others keep what they have.
 pub(crate) fn place<L: LightField>(
     light: Light<'_, L>,
     links: &Links,
     error: f32,
-    exposed: &[f32],
     stale: impl Fn(u32) -> bool,
     placed: &mut Vec<Placed>,
 ) {
@@ -118,7 +116,7 @@ pub(crate) fn place<L: LightField>(
         .with_min_len(16)
         .map(|&leaf| match place_leaf(light, links, leaf, error) {
             // What is seen from the middle of the leaf is nothing to what is open of it.
-            placed if exposed[leaf as usize] < 1.0 => Placed { row: Correction::default(), ..placed },
+            placed if light.elements.exposed(leaf) < 1.0 => Placed { row: Correction::default(), ..placed },
             placed => placed,
         })
         .collect();

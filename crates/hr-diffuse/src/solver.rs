@@ -2,7 +2,7 @@
 
 use crate::columns::{FREELY, STRICTLY, gains};
 use crate::error::SolveError;
-use crate::exposed::exposed;
+use crate::exposed::expose;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::{LightField, NodeId, Transfer};
@@ -20,7 +20,7 @@ use std::time::Instant;
 
 /// A link's tolerance is this share of the error asked for, times the mean irradiance. Chosen so that the error of
 /// the built-in scenes stays below what was asked for.
-const LINK_SHARE: f32 = 0.085;
+const LINK_SHARE: f32 = 0.07;
 /// Elements are not split below this share of the error's square root: features smaller than that are not resolved.
 const SMALLEST_SHARE: f32 = 0.008;
 /// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
@@ -96,8 +96,6 @@ pub struct Solver<L: LightField = ()> {
     placed: Vec<Placed>,
     /// By node: for which links it was placed.
     placed_for: Vec<u64>,
-    /// By node: the share of it that light may reach, see [`exposed`](crate::exposed).
-    exposed: Vec<f32>,
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
     /// diffuse light.
     pub(crate) faint: Vec<Rgb>,
@@ -160,7 +158,6 @@ impl<L: LightField> Solver<L> {
             transfers: Vec::new(),
             placed: Vec::new(),
             placed_for: Vec::new(),
-            exposed: Vec::new(),
             faint,
             strong,
             last_reflected: Vec::new(),
@@ -246,7 +243,7 @@ impl<L: LightField> Solver<L> {
         let count = self.elements.nodes.len();
         self.links = Links::new(refined.links, count);
         self.unlit = refined.unlit;
-        exposed(&self.scene, &self.elements, &mut self.exposed);
+        expose(&self.scene, &mut self.elements);
         self.incident.resize_with(count, L::Incident::default);
         self.stats.skipped += refined.skipped;
         self.stats.pairs += refined.pairs;
@@ -364,7 +361,7 @@ impl<L: LightField> Solver<L> {
                     node = elements.nodes[node as usize].parent;
                 }
                 let placed = self.placed.get(leaf as usize).copied().unwrap_or_default();
-                let exposed = self.exposed[leaf as usize];
+                let exposed = elements.exposed(leaf);
                 if exposed <= 0.0 {
                     return Rgb::ZERO;
                 }
@@ -383,7 +380,7 @@ impl<L: LightField> Solver<L> {
         let mut placed = std::mem::take(&mut self.placed);
         let before = std::mem::replace(&mut self.placed_for, hashes);
         let stale = |leaf: u32| before.get(leaf as usize) != Some(&self.placed_for[leaf as usize]);
-        place(self.light(), &self.links, self.settings.error, &self.exposed, stale, &mut placed);
+        place(self.light(), &self.links, self.settings.error, stale, &mut placed);
         self.placed = placed;
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }

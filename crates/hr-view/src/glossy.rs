@@ -51,7 +51,8 @@ pub fn interpolated(solution: &Solution<GlossyField>, corners: &[(u32, f32)], no
         let around = solution.vertices.leaves_around(vertex);
         for &leaf in around {
             let (light, weight) = leaving(solution, NodeId(leaf), normal, away);
-            let weight = weight * share / around.len() as f32;
+            // What lies below something is not seen.
+            let weight = weight * solution.elements.exposed(leaf) * share / around.len() as f32;
             sum += light * weight;
             weights += weight;
         }
