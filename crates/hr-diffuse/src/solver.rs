@@ -1,6 +1,7 @@
 //! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
 
 use crate::columns::{FREELY, STRICTLY, gains};
+use crate::convergence::Convergence;
 use crate::error::SolveError;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
@@ -10,9 +11,12 @@ use crate::place::{Class, Gathered, Placed, place, renewed};
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
 use crate::stats::Stats;
+use crate::steady;
 use crate::transport::{Exitant, Light};
+use crate::twins::twins;
 use crate::visibility::Visibility;
 use crate::{Facing, LightKind, Rgb, SceneInput};
+use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -33,6 +37,13 @@ const CONVERGED_SHARE: f32 = 0.02;
 const FIRST_REFLECTED: usize = 2;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
+
+/// Exitances and intensities above this are refused: sums of powers and what white surfaces make of them would leave the
+/// range of f32.
+const MOST_LIGHT: f32 = 1e30;
+
+/// Channels with less than this share of the strongest one's light need not converge by themselves.
+const FAINT_CHANNEL: f64 = 1e-3;
 
 /// What is asked of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,14 +117,15 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) brightest: Vec<f32>,
     /// Area whose light counts.
     area: f32,
+    convergence: Convergence,
 }
 
 impl<L: LightField> Solver<L> {
     /// Checks a scene and builds its hierarchy.
     ///
     /// # Errors
-    /// A [`SolveError`] where the scene is empty, or some surface, material, light or the error asked for makes no
-    /// sense.
+    /// A [`SolveError`] where the scene is empty, some surface, material, light or the error asked for makes no
+    /// sense, or light would grow without end ([`SolveError::NoSteadyState`]).
     pub fn new(input: &SceneInput, settings: Settings, field: L) -> Result<Self, SolveError> {
         let start = Instant::now();
         if !(0.001..=1.0).contains(&settings.error) {
@@ -127,6 +139,7 @@ impl<L: LightField> Solver<L> {
                 None => (Rgb::ZERO, Rgb::ZERO),
             })
             .unzip();
+        steady::check(&scene, |material| field.active(material).unwrap_or(Rgb::ZERO))?;
         let elements = Elements::build(&scene, |material| field.active(material));
         let count = elements.nodes.len();
         let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
@@ -160,6 +173,7 @@ impl<L: LightField> Solver<L> {
             most_reflected: FREELY,
             brightest: Vec::new(),
             area,
+            convergence: Convergence::default(),
         };
         solver.pull();
         solver.stats.skipped.sealed_sides = solver.elements.sealed;
@@ -215,6 +229,7 @@ impl<L: LightField> Solver<L> {
             smallest: SMALLEST_SHARE * self.settings.error.sqrt(),
         };
         let error = self.believed_error(looseness);
+        self.convergence.restart();
         let (links, unlit) = (self.links.take(), std::mem::take(&mut self.unlit));
         let nodes = self.elements.nodes.len() as u64;
         let already = *stopped;
@@ -255,6 +270,7 @@ impl<L: LightField> Solver<L> {
         let start = Instant::now();
         self.gather();
         self.push();
+        let residual = self.extrapolate(&before);
         let middle = Instant::now();
         if reflects && self.reflect_senders() {
             self.exitant.gain = gains(self.light(), &self.links, self.most_reflected);
@@ -263,19 +279,35 @@ impl<L: LightField> Solver<L> {
         self.pull();
         self.stats.seconds.transport += (middle - start).as_secs_f64() + end.elapsed().as_secs_f64();
         self.stats.seconds.reflect += (end - middle).as_secs_f64();
-        let (mut change, mut total) = (0.0_f64, 0.0_f64);
+        self.stats.iterations += 1;
+        self.stats.residuals.push(residual);
+        residual
+    }
+
+    /// Adds what the iterations to come would, where that is known. Returns the change since `before`, relative to the
+    /// light there is: that of the channel that changed most.
+    fn extrapolate(&mut self, before: &[Rgb]) -> f32 {
+        let (mut change, mut moved, mut total) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
         for leaf in self.elements.patch_leaves() {
             let (element, leaf) = (&self.elements.nodes[leaf as usize], leaf as usize);
             let weight = f64::from(element.area * element.importance);
             let now = self.exitant.irradiance[leaf];
-            let delta = (now - before[leaf]).abs();
-            change += weight * f64::from(delta.element_sum());
-            total += weight * f64::from(now.element_sum());
+            let delta = (now - before[leaf]).as_dvec3();
+            change += weight * delta;
+            moved += weight * delta.abs();
+            total += weight * now.as_dvec3();
         }
-        let residual = if total > 0.0 { (change / total) as f32 } else { 0.0 };
-        self.stats.iterations += 1;
-        self.stats.residuals.push(residual);
-        residual
+        let ahead = self.convergence.ahead(change);
+        if ahead != Rgb::ZERO {
+            let leaves: Vec<u32> = self.elements.patch_leaves().collect();
+            for leaf in leaves {
+                let now = &mut self.exitant.irradiance[leaf as usize];
+                *now = (*now + (*now - before[leaf as usize]) * ahead).max(Rgb::ZERO);
+            }
+        }
+        // Channels in which there is next to nothing need not converge by themselves.
+        let total = total.max(DVec3::splat(FAINT_CHANNEL * total.max_element()));
+        if total.max_element() > 0.0 { (moved / total).max_element() as f32 } else { 0.0 }
     }
 
     /// Read access to hierarchy and exitant light.
@@ -368,6 +400,7 @@ impl<L: LightField> Solver<L> {
     fn place(&mut self) {
         let start = Instant::now();
         self.placed = place(self.light(), &self.links);
+        self.convergence.restart();
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 
@@ -452,12 +485,10 @@ impl<L: LightField> Solver<L> {
         last.len() == 4 && last.windows(2).all(|pair| pair[1] > pair[0])
     }
 
-    /// What all iterations to come would change, if the residuals go on shrinking as they did last: the sum of the
-    /// geometric series.
+    /// What all iterations to come would change.
     fn remaining(&self, residual: f32) -> f32 {
         let before = self.stats.residuals.iter().rev().nth(1).copied().unwrap_or(f32::INFINITY);
-        let rate = (residual / before).clamp(0.0, 0.999);
-        if before.is_finite() { residual * (rate / (1.0 - rate)).max(0.1) } else { residual }
+        self.convergence.remaining(residual, before)
     }
 
     fn believed_error(&self, looseness: f32) -> f32 {
@@ -498,6 +529,9 @@ fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
         if !e.is_finite() || e.min_element() < 0.0 {
             return wrong("exitance", e, "not negative");
         }
+        if e.max_element() > MOST_LIGHT {
+            return wrong("exitance", e, "at most 1e30 W/m²");
+        }
     }
     for (surface, s) in input.surfaces.iter().enumerate() {
         if s.material as usize >= input.materials.len() {
@@ -525,16 +559,27 @@ fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
             return Err(SolveError::Light { light, what: "it is too far from the scene; make it a directional light" });
         }
     }
-    let lights = input.lights.iter().map(|l| match l.kind {
-        LightKind::Directional { .. } => *l,
-        _ => crate::Light { intensity: l.intensity * scale2, ..*l },
-    });
+    let lights: Vec<crate::Light> = input
+        .lights
+        .iter()
+        .map(|l| match l.kind {
+            LightKind::Directional { .. } => *l,
+            _ => crate::Light { intensity: l.intensity * scale2, ..*l },
+        })
+        .collect();
+    // In a scene of micrometres a light of kilowatts is beyond f32.
+    if let Some(light) = lights.iter().position(|l| l.intensity.max_element() > MOST_LIGHT) {
+        return Err(SolveError::Light { light, what: "it is too strong for the size of the scene" });
+    }
+    let surface_materials: Vec<u32> = input.surfaces.iter().map(|s| s.material).collect();
+    let twins = twins(&surfaces, &surface_materials);
     Ok(SceneData {
-        visibility: Visibility::new(&surfaces),
-        surface_materials: input.surfaces.iter().map(|s| s.material).collect(),
+        visibility: Visibility::with_twins(&surfaces, &twins),
+        surface_materials,
+        twins,
         shading_normals: input.surfaces.iter().map(|s| s.shading_normals).collect(),
         materials: input.materials.clone(),
-        lights: lights.collect(),
+        lights,
         light_positions: input.lights.iter().map(|l| normalization.to_unit(l.position)).collect(),
         texture: input.texture.clone(),
         normalization,
