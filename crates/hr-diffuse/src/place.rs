@@ -14,6 +14,7 @@ use crate::transport::{Light, NEGLIGIBLE};
 use glam::Vec3;
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
+use std::ops::ControlFlow;
 
 /// Light that arrives at leaves differs by no more than this factor from what was pushed down to them. Surfaces that
 /// lie in one another's plane hide each other by turns, which no ray can tell.
@@ -99,15 +100,28 @@ impl Placed {
     }
 }
 
-/// Places all leaves; by node.
-pub(crate) fn place<L: LightField>(light: Light<'_, L>, links: &Links) -> Vec<Placed> {
+/// Leaves that a thread places between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 16;
+
+/// Places all leaves; by node. `None` where `watch` broke.
+pub(crate) fn place<L: LightField>(
+    light: Light<'_, L>,
+    links: &Links,
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Vec<Placed>> {
     let leaves: Vec<u32> = light.elements.patch_leaves().collect();
-    let places: Vec<Placed> = leaves.par_iter().with_min_len(16).map(|&leaf| place_leaf(light, links, leaf)).collect();
+    let mut places: Vec<Placed> = Vec::with_capacity(leaves.len());
+    for part in leaves.chunks(BETWEEN_WATCHES * rayon::current_num_threads()) {
+        if watch().is_break() {
+            return None;
+        }
+        places.par_extend(part.par_iter().with_min_len(8).map(|&leaf| place_leaf(light, links, leaf)));
+    }
     let mut placed = vec![Placed::default(); light.elements.nodes.len()];
     for (leaf, place) in leaves.into_iter().zip(places) {
         placed[leaf as usize] = place;
     }
-    placed
+    Some(placed)
 }
 
 fn place_leaf<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32) -> Placed {

@@ -35,6 +35,8 @@ const FAINT_SHARE: f32 = 0.7;
 const CONVERGED_SHARE: f32 = 0.02;
 /// The first pass that reflects the extension's light: before it, there is little light to reflect.
 const FIRST_REFLECTED: usize = 2;
+/// Nodes whose links a thread gathers between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 1024;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
 
@@ -181,27 +183,36 @@ impl<L: LightField> Solver<L> {
         Ok(solver)
     }
 
-    /// Solves. `watch` is told how far it is and may break: then what there is is finished quickly, without
-    /// refining any more.
+    /// Solves. `watch` is told how far it is every few milliseconds, and may break: then the solution is what there is by
+    /// then, and [`Stats::stopped`] is set. Budgets of time and memory are its business: a link takes 16 bytes, an
+    /// element about 400 and what the extension keeps of it.
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
         for (pass, looseness) in PASSES.iter().chain(std::iter::repeat(&1.0)).enumerate().take(PASSES.len() + 1) {
             let last = pass + 1 >= PASSES.len();
             let changed = self.refine(pass, *looseness, &mut stopped, watch);
-            let goal = if last || stopped { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
-            let most = if last || stopped { MOST_ITERATIONS } else { 3 };
+            let goal = if last { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
+            let most = if last { MOST_ITERATIONS } else { 3 };
+            if stopped {
+                // New elements have their parents' light.
+                break;
+            }
             for iteration in 0..most {
+                let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
+                let progress = self.progress(Phase::Transport, fraction, *looseness);
+                let ask = &mut || {
+                    stopped = stopped || watch(&progress).is_break();
+                    if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                };
                 // Once the light is there, and what is linked is nearly fine enough.
                 if iteration == 1 && pass + 2 >= PASSES.len() {
-                    self.place();
+                    self.place(ask);
                 }
-                let residual = self.iterate(pass >= FIRST_REFLECTED);
+                let Some(residual) = self.iterate(pass >= FIRST_REFLECTED, ask) else { break };
                 if self.grows() {
                     self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
                 }
-                let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
-                stopped |= watch(&self.progress(Phase::Transport, fraction, *looseness)).is_break();
-                if self.remaining(residual) < goal || stopped && iteration > 0 {
+                if stopped || self.remaining(residual) < goal {
                     break;
                 }
             }
@@ -209,6 +220,11 @@ impl<L: LightField> Solver<L> {
                 break;
             }
         }
+        if self.stats.iterations == 0 {
+            // Whenever it was stopped, there is some light.
+            self.iterate(false, &mut || ControlFlow::Continue(()));
+        }
+        self.stats.stopped = stopped;
         self.stats.nodes = self.elements.nodes.len() as u64;
         self.stats.leaves = self.elements.patch_leaves().count() as u64;
         self.stats.links = self.links.all().len() as u64;
@@ -232,7 +248,6 @@ impl<L: LightField> Solver<L> {
         self.convergence.restart();
         let (links, unlit) = (self.links.take(), std::mem::take(&mut self.unlit));
         let nodes = self.elements.nodes.len() as u64;
-        let already = *stopped;
         let mut light = MutableLight {
             scene: &self.scene,
             elements: &mut self.elements,
@@ -243,9 +258,6 @@ impl<L: LightField> Solver<L> {
         };
         let mut wave_number = 0.0_f32;
         let refined = refine(&mut light, links, unlit, tolerance, &mut |wave, done| {
-            if already {
-                return ControlFlow::Break(());
-            }
             wave_number += 1.0;
             let fraction = progress_fraction(pass, 0.8 * wave_number / (wave_number + 8.0));
             watch(&Progress { phase: Phase::Refine, fraction, error, links: wave + done, nodes })
@@ -264,15 +276,17 @@ impl<L: LightField> Solver<L> {
     }
 
     /// One iteration of the paper: gather, push, reflect, pull. Returns the change of the mean radiosity, relative
-    /// to it.
-    fn iterate(&mut self, reflects: bool) -> f32 {
+    /// to it; `None`, and no change, where `watch` broke before the light was gathered.
+    fn iterate(&mut self, reflects: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Option<f32> {
         let before: Vec<Rgb> = self.exitant.irradiance.clone();
         let start = Instant::now();
-        self.gather();
+        if self.gather(watch).is_break() {
+            return None;
+        }
         self.push();
         let residual = self.extrapolate(&before);
         let middle = Instant::now();
-        if reflects && self.reflect_senders() {
+        if reflects && self.reflect_senders(watch) {
             self.exitant.gain = gains(self.light(), &self.links, self.most_reflected);
         }
         let end = Instant::now();
@@ -281,7 +295,7 @@ impl<L: LightField> Solver<L> {
         self.stats.seconds.reflect += (end - middle).as_secs_f64();
         self.stats.iterations += 1;
         self.stats.residuals.push(residual);
-        residual
+        Some(residual)
     }
 
     /// Adds what the iterations to come would, where that is known. Returns the change since `before`, relative to the
@@ -322,7 +336,7 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Every receiver adds up what its links carry, in parallel, each on its own state.
-    fn gather(&mut self) {
+    fn gather(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> ControlFlow<()> {
         let count = self.elements.nodes.len();
         let mut own = std::mem::take(&mut self.own);
         let mut transfers = std::mem::take(&mut self.transfers);
@@ -330,35 +344,48 @@ impl<L: LightField> Solver<L> {
         own.resize(count, Gathered::default());
         transfers.resize_with(count, Vec::new);
         let (light, links, field) = (self.light(), &self.links, &self.field);
-        own.par_iter_mut().zip(&mut transfers).zip(&mut incident).enumerate().with_min_len(64).for_each(
-            |(node, ((own, transfers), incident))| {
-                *own = Gathered::default();
-                transfers.clear();
-                let element = light.element(node as u32);
+        let gather = |node: usize, own: &mut Gathered, transfers: &mut Vec<Transfer>, incident: &mut L::Incident| {
+            *own = Gathered::default();
+            transfers.clear();
+            let element = light.element(node as u32);
+            if element.active {
+                field.clear(incident);
+            }
+            let flat = element.is_flat();
+            for link in links.of(node as u32) {
+                let direction = light.direction_to(element.center, link.sender);
+                let visible = link.factor * link.visibility.abs();
+                let irradiance = light.emitted(link.sender, -direction) * visible;
+                if irradiance.max_element() <= 0.0 {
+                    continue;
+                }
+                let transfer = Transfer { sender: NodeId(link.sender), direction, irradiance, oriented: flat };
+                if flat {
+                    *own.of(Class::of(light, link.sender)) += irradiance;
+                } else {
+                    transfers.push(transfer);
+                }
                 if element.active {
-                    field.clear(incident);
+                    field.receive(incident, &transfer);
                 }
-                let flat = element.is_flat();
-                for link in links.of(node as u32) {
-                    let direction = light.direction_to(element.center, link.sender);
-                    let visible = link.factor * link.visibility.abs();
-                    let irradiance = light.emitted(link.sender, -direction) * visible;
-                    if irradiance.max_element() <= 0.0 {
-                        continue;
-                    }
-                    let transfer = Transfer { sender: NodeId(link.sender), direction, irradiance, oriented: flat };
-                    if flat {
-                        *own.of(Class::of(light, link.sender)) += irradiance;
-                    } else {
-                        transfers.push(transfer);
-                    }
-                    if element.active {
-                        field.receive(incident, &transfer);
-                    }
-                }
-            },
-        );
+            }
+        };
+        let chunk = BETWEEN_WATCHES * rayon::current_num_threads();
+        let mut answer = ControlFlow::Continue(());
+        for first in (0..count).step_by(chunk) {
+            answer = watch();
+            if answer.is_break() {
+                break;
+            }
+            let part = first..(first + chunk).min(count);
+            let nodes = own[part.clone()].par_iter_mut().zip(&mut transfers[part.clone()]).zip(&mut incident[part]);
+            nodes
+                .enumerate()
+                .with_min_len(64)
+                .for_each(|(i, ((own, transfers), incident))| gather(first + i, own, transfers, incident));
+        }
         (self.own, self.transfers, self.incident) = (own, transfers, incident);
+        answer
     }
 
     /// Hands light down to the leaves: the sum of what their ancestors received. Light on nodes that are not flat
@@ -397,9 +424,11 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Finds out what the places of the leaves make of the light on their ancestors.
-    fn place(&mut self) {
+    fn place(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         let start = Instant::now();
-        self.placed = place(self.light(), &self.links);
+        if let Some(placed) = place(self.light(), &self.links, watch) {
+            self.placed = placed;
+        }
         self.convergence.restart();
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
