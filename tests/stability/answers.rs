@@ -13,16 +13,16 @@ pub(crate) const ERROR: f32 = 0.15;
 pub(crate) fn assert_sane<L: LightField>(solution: &Solution<L>, what: &str) {
     let light = solution.exitant.radiosity.iter().chain(&solution.exitant.irradiance);
     for light in light.chain(&solution.vertices.irradiance) {
-        assert!(light.is_finite() && light.min_element() >= 0.0, "{what}: light of {light}");
+        assert!(light.is_finite() && light.min_element() >= 0.0, "light of {light}: {what}");
     }
     for link in solution.links.all() {
-        assert!(link.factor.is_finite() && link.factor >= 0.0, "{what}: {link:?}");
-        assert!((-1.0..=1.0).contains(&link.visibility), "{what}: {link:?}");
+        assert!(link.factor.is_finite() && link.factor >= 0.0, "{link:?}: {what}");
+        assert!((-1.0..=1.0).contains(&link.visibility), "{link:?}: {what}");
     }
     for node in &solution.elements.nodes {
-        assert!(node.area.is_finite() && node.radius.is_finite() && node.center.is_finite(), "{what}: {node:?}");
+        assert!(node.area.is_finite() && node.radius.is_finite() && node.center.is_finite(), "{node:?}: {what}");
     }
-    assert!(solution.vertices.positions.iter().all(|p| p.is_finite()), "{what}: positions of vertices");
+    assert!(solution.vertices.positions.iter().all(|p| p.is_finite()), "positions of vertices: {what}");
 }
 
 /// Mean irradiance of a surface's front, averaged over the channels; 0 where no light reaches it.

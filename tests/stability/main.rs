@@ -8,6 +8,8 @@ mod crowds;
 mod energy;
 mod input;
 mod placement;
+mod random;
 #[path = "../pipeline/scenes.rs"]
 #[allow(dead_code, reason = "the pipeline's tests use more of it")]
 mod scenes;
+mod stopping;
