@@ -101,7 +101,7 @@ impl Placed {
 }
 
 /// Leaves that a thread places between two calls of `watch`: some milliseconds.
-const BETWEEN_WATCHES: usize = 16;
+const BETWEEN_WATCHES: usize = 8;
 
 /// Places all leaves; by node. `None` where `watch` broke.
 pub(crate) fn place<L: LightField>(
@@ -115,7 +115,7 @@ pub(crate) fn place<L: LightField>(
         if watch().is_break() {
             return None;
         }
-        places.par_extend(part.par_iter().with_min_len(8).map(|&leaf| place_leaf(light, links, leaf)));
+        places.par_extend(part.par_iter().with_min_len(2).map(|&leaf| place_leaf(light, links, leaf)));
     }
     let mut placed = vec![Placed::default(); light.elements.nodes.len()];
     for (leaf, place) in leaves.into_iter().zip(places) {

@@ -21,7 +21,7 @@ const REPRESENTATIVES: usize = 16;
 const REFLECT_SHARE: f32 = 1.0;
 
 /// Leaves that a thread reflects between two calls of `watch`: some milliseconds.
-const BETWEEN_WATCHES: usize = 16;
+const BETWEEN_WATCHES: usize = 8;
 
 /// Leaves, and the area that each stands for.
 type Representatives = SmallVec<[(u32, f32); 16]>;
