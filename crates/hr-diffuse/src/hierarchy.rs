@@ -192,9 +192,11 @@ impl Elements {
         let mut sealed = 0;
         let idle = idle(scene, &extra);
         for (i, lit) in lit_sides(scene, &idle).into_iter().enumerate() {
-            if idle[i] {
+            if scene.is_twin(i as u32) {
                 continue;
             }
+            // Black ones are there to be shown.
+            let lit = [lit[0] || idle[i], lit[1]];
             let material = &scene.materials[scene.surface_materials[i] as usize];
             let glossy = extra(scene.surface_materials[i]);
             let front = patch(scene, i as u32, Kind::Front, Domain::WHOLE, glossy);
@@ -370,8 +372,7 @@ const EMPTY: Element = Element {
     convex: false,
 };
 
-/// For each surface whether it does nothing with light but hide it, and so needs no elements: it is black, or coincides
-/// with another one. Where all are black, none is.
+/// For each surface whether it does nothing with light but hide it: it is black, or coincides with another one.
 fn idle(scene: &SceneData, extra: &impl Fn(u32) -> Option<Rgb>) -> Vec<bool> {
     let black = |surface: u32| {
         let material = scene.surface_materials[surface as usize];
@@ -379,9 +380,7 @@ fn idle(scene: &SceneData, extra: &impl Fn(u32) -> Option<Rgb>) -> Vec<bool> {
         let reflects = (scene.reflectance(surface, &Domain::WHOLE) + glossy).max_element() > 0.0;
         !reflects && scene.materials[material as usize].exitance == Rgb::ZERO
     };
-    let surfaces = 0..scene.surfaces().len() as u32;
-    let all_black = surfaces.clone().all(black);
-    surfaces.map(|surface| scene.is_twin(surface) || !all_black && black(surface)).collect()
+    (0..scene.surfaces().len() as u32).map(|surface| scene.is_twin(surface) || black(surface)).collect()
 }
 
 /// An element for a part of a surface.

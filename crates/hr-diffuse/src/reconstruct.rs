@@ -258,7 +258,13 @@ pub(crate) fn reconstruct<L: LightField>(
         let part: Vec<Gathering> = (start..end)
             .into_par_iter()
             .with_min_len(16)
-            .map(|vertex| gather_at(light, links, vertices.leaf[vertex], vertices.uv[vertex], vertex as u32))
+            .map(|vertex| {
+                let around = vertices.leaves_around(vertex as u32);
+                if around.iter().all(|&leaf| light.element(leaf).importance <= 0.0) {
+                    return Gathering::default();
+                }
+                gather_at(light, links, vertices.leaf[vertex], vertices.uv[vertex], vertex as u32)
+            })
             .collect();
         for (vertex, gathering) in (start..end).zip(part) {
             rays += u64::from(gathering.rays);
@@ -344,7 +350,8 @@ fn gather_at<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, uv: V
     Gathering { irradiance: placed.irradiance(own, kept), rays, covered: seen.covered }
 }
 
-/// What was gathered at a vertex.
+/// What was gathered at a vertex; nothing where only black surfaces meet.
+#[derive(Default)]
 struct Gathering {
     irradiance: Rgb,
     rays: u32,
