@@ -1,8 +1,7 @@
-//! The whole pipeline, from surfaces to the finished solution: analytic answers, invariances, determinism, bad input.
+//! The whole pipeline, from surfaces to the finished solution: analytic answers, invariances, determinism.
 
 mod determinism;
 mod diffuse;
 mod furnace;
-mod input;
 mod invariance;
 mod scenes;

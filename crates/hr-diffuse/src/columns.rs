@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 /// Of what a leaf does not reflect diffusely, links may carry so much as directional light at first. What the links of a
 /// sender carry errs either way; to cut it off at what is right on average would lose light.
-pub(crate) const FREELY: f32 = 2.0;
+pub(crate) const FREELY: f32 = 1.4;
 /// With this, light dies out in any scene.
 pub(crate) const STRICTLY: f32 = 0.9;
 

@@ -45,6 +45,17 @@ pub enum SolveError {
         /// Which property.
         what: &'static str,
     },
+    /// Light arrives where nothing absorbs it and whence it cannot leave: it would grow without end.
+    #[error(
+        "surface {surface} and all that it sees reflect {channel} light without loss, and none of it can leave: there \
+         is no steady state; give one of their materials a reflectance below 1, or open the room"
+    )]
+    NoSteadyState {
+        /// Index of one of the surfaces.
+        surface: usize,
+        /// The channel.
+        channel: &'static str,
+    },
     /// The error asked for is out of range.
     #[error("an error of {error} was asked for; it must lie within 0.001 and 1")]
     Error {

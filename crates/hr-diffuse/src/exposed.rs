@@ -5,8 +5,8 @@
 
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::sampling::{hash, point2};
+use crate::sealed::cosine_direction;
 use rayon::prelude::*;
-use std::f32::consts::TAU;
 
 /// Points of a leaf that are looked from at first, and where some of them see what nobody else does.
 const FIRST_POINTS: u32 = 6;
@@ -14,7 +14,7 @@ const POINTS: u32 = 24;
 /// Rays of a point; it is covered where all meet dark sides.
 const RAYS: u32 = 3;
 /// Less than this share of a leaf is taken for so much: what little is there is known too badly.
-const LEAST: f32 = 0.2;
+const LEAST: f32 = 0.5;
 
 /// Finds the shares of new nodes' areas that light may reach: 1 for all but leaves that are flat, 0 for wholly covered ones.
 pub(crate) fn expose(scene: &SceneData, elements: &mut Elements) {
@@ -38,10 +38,8 @@ fn exposed_share(scene: &SceneData, elements: &Elements, leaf: u32) -> f32 {
         let u = point2(hash(leaf, 0xe7), i);
         let (x, normal, _) = geometry.sample_area(element.domain, u.x, u.y);
         let n = normal * side;
-        let (a, b) = n.any_orthonormal_pair();
         let v = point2(hash(leaf, 0xe8), i * RAYS + ray);
-        let (sin, cos) = (TAU * v.x).sin_cos();
-        let direction = (a * cos + b * sin) * v.y.sqrt() + n * (1.0 - v.y).sqrt();
+        let direction = cosine_direction(n, v.x, v.y);
         let hit = scene.visibility.closest_except(x, direction, 0.0, f32::MAX, element.source);
         hit.is_some_and(|hit| {
             let material = &scene.materials[scene.surface_materials[hit.surface as usize] as usize];

@@ -109,6 +109,8 @@ impl Element {
 pub struct SceneData {
     /// Material of each surface.
     pub surface_materials: Vec<u32>,
+    /// For each surface the first one that coincides with it: itself, mostly. The others have no elements of their own.
+    pub twins: Vec<u32>,
     /// Shading normals of the surfaces that have any.
     pub shading_normals: Vec<Option<[Vec3; 4]>>,
     /// Diffuse materials.
@@ -130,6 +132,11 @@ impl SceneData {
     #[must_use]
     pub fn surfaces(&self) -> &[Geometry] {
         self.visibility.geometries()
+    }
+
+    /// Whether a surface coincides with one before it, which counts in its place.
+    pub(crate) fn is_twin(&self, surface: u32) -> bool {
+        self.twins[surface as usize] != surface
     }
 
     /// Unit shading normal on the front side: interpolated where the surface has shading normals.
@@ -185,7 +192,13 @@ impl Elements {
     pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<Rgb>) -> Self {
         let mut roots: Vec<Element> = Vec::new();
         let mut sealed = vec![[false; 2]; scene.surfaces().len()];
-        for (i, lit) in lit_sides(scene).into_iter().enumerate() {
+        let idle = idle(scene, &extra);
+        for (i, lit) in lit_sides(scene, &idle).into_iter().enumerate() {
+            if scene.is_twin(i as u32) {
+                continue;
+            }
+            // Black ones are there to be shown.
+            let lit = [lit[0] || idle[i], lit[1]];
             let material = &scene.materials[scene.surface_materials[i] as usize];
             let glossy = extra(scene.surface_materials[i]);
             let front = patch(scene, i as u32, Kind::Front, Domain::WHOLE, glossy);
@@ -214,6 +227,9 @@ impl Elements {
             exposed: Vec::new(),
         };
         elements.flatten(root);
+        for (surface, &twin) in scene.twins.iter().enumerate() {
+            elements.surface_nodes[surface] = elements.surface_nodes[twin as usize];
+        }
         for node in 0..elements.nodes.len() {
             elements.add_facets(scene, node);
         }
@@ -375,6 +391,17 @@ const EMPTY: Element = Element {
     whole_sphere: false,
     convex: false,
 };
+
+/// For each surface whether it does nothing with light but hide it: it is black, or coincides with another one.
+fn idle(scene: &SceneData, extra: &impl Fn(u32) -> Option<Rgb>) -> Vec<bool> {
+    let black = |surface: u32| {
+        let material = scene.surface_materials[surface as usize];
+        let glossy = extra(material).unwrap_or(Rgb::ZERO);
+        let reflects = (scene.reflectance(surface, &Domain::WHOLE) + glossy).max_element() > 0.0;
+        !reflects && scene.materials[material as usize].exitance == Rgb::ZERO
+    };
+    (0..scene.surfaces().len() as u32).map(|surface| scene.is_twin(surface) || black(surface)).collect()
+}
 
 /// An element for a part of a surface.
 fn patch(scene: &SceneData, surface: u32, kind: Kind, domain: Domain, glossy: Option<Rgb>) -> Element {

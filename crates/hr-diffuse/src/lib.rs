@@ -8,6 +8,7 @@
 
 mod columns;
 pub mod cone;
+mod convergence;
 pub mod error;
 mod exposed;
 pub mod facing;
@@ -29,7 +30,9 @@ mod segments;
 pub mod solution;
 pub mod solver;
 pub mod stats;
+mod steady;
 pub mod transport;
+mod twins;
 pub mod visibility;
 
 pub use cone::Cone;

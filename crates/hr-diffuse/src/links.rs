@@ -57,12 +57,12 @@ impl Links {
         }
     }
 
-    /// By node, a hash of the links that it receives through, and the surface that it is a part of.
+    /// By node, a hash of the links that it and its ancestors receive through.
     pub(crate) fn hashes(&self, elements: &Elements) -> Vec<u64> {
         let mut hashes = vec![0; elements.nodes.len()];
         for (node, element) in elements.nodes.iter().enumerate() {
             let mut hasher = DefaultHasher::new();
-            if elements.nodes[element.parent as usize].is_patch() {
+            if node > 0 {
                 hasher.write_u64(hashes[element.parent as usize]);
             }
             hasher.write(bytemuck::cast_slice(self.of(node as u32)));

@@ -14,6 +14,7 @@ use crate::transport::{Light, NEGLIGIBLE};
 use glam::Vec3;
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
+use std::ops::ControlFlow;
 
 /// Light that arrives at leaves differs by no more than this factor from what was pushed down to them. Surfaces that
 /// lie in one another's plane hide each other by turns, which no ray can tell.
@@ -83,11 +84,13 @@ pub(crate) struct Placed {
     pub(crate) inherited: [f32; 3],
     /// Factors that make the form factors sum to what there is to see.
     pub(crate) row: Correction,
+    /// Share of the leaf that light may reach, which gets all of it.
+    pub(crate) exposed: f32,
 }
 
 impl Default for Placed {
     fn default() -> Self {
-        Self { inherited: [1.0; 3], row: Correction::default() }
+        Self { inherited: [1.0; 3], row: Correction::default(), exposed: 1.0 }
     }
 }
 
@@ -98,32 +101,39 @@ impl Placed {
         let lights = lights + from[0] * self.inherited[0];
         let emitters = emitters + from[1] * self.inherited[1];
         let inherited = (clusters + from[2] + from[3]) * (self.inherited[2] * self.row.inherited);
-        lights + (emitters + (patches + inherited) * self.row.rest) * self.row.all
+        if self.exposed <= 0.0 {
+            return Rgb::ZERO;
+        }
+        (lights + (emitters + (patches + inherited) * self.row.rest) * self.row.all) / self.exposed
     }
 }
 
-/// Places the leaves that are `stale`, to the error asked for; by node. The others keep what they have.
+/// Leaves that a thread places between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 8;
+
+/// Places the leaves that are `stale`, to the error asked for; by node. The others keep what they have, and all do where
+/// `watch` breaks: false then.
 pub(crate) fn place<L: LightField>(
     light: Light<'_, L>,
     links: &Links,
     error: f32,
     stale: impl Fn(u32) -> bool,
     placed: &mut Vec<Placed>,
-) {
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> bool {
     let leaves: Vec<u32> = light.elements.patch_leaves().filter(|&leaf| stale(leaf)).collect();
-    let places: Vec<Placed> = leaves
-        .par_iter()
-        .with_min_len(16)
-        .map(|&leaf| match place_leaf(light, links, leaf, error) {
-            // What is seen from the middle of the leaf is nothing to what is open of it.
-            placed if light.elements.exposed(leaf) < 1.0 => Placed { row: Correction::default(), ..placed },
-            placed => placed,
-        })
-        .collect();
+    let mut places: Vec<Placed> = Vec::with_capacity(leaves.len());
+    for part in leaves.chunks(BETWEEN_WATCHES * rayon::current_num_threads()) {
+        if watch().is_break() {
+            return false;
+        }
+        places.par_extend(part.par_iter().with_min_len(2).map(|&leaf| place_leaf(light, links, leaf, error)));
+    }
     placed.resize(light.elements.nodes.len(), Placed::default());
     for (leaf, place) in leaves.into_iter().zip(places) {
         placed[leaf as usize] = place;
     }
+    true
 }
 
 fn place_leaf<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, error: f32) -> Placed {
@@ -165,7 +175,10 @@ fn place_leaf<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, erro
                 if class == Class::Cluster { light.element(link.sender).mean_cosine(-direction) } else { 1.0 };
             inherited_row[class.group()] += carried * pattern;
             let brought = carried * light.emitted(link.sender, -direction).element_sum();
-            if brought < faint {
+            let sender = light.element(link.sender);
+            let apart = element.center.distance_squared(sender.center);
+            let most = light.emitted_most(link.sender) * visible;
+            if brought < faint && sender.radius * sender.radius * most < 4.0 * faint * apart {
                 exact[class.group()] += brought;
                 continue;
             }
@@ -186,13 +199,18 @@ fn place_leaf<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, erro
     // Rows are those of the light as it is pushed down: sums that are no more than 1 let it die out, whatever it becomes.
     row.emitters += inherited[1] * inherited_row[1];
     row.inherited = inherited[2] * inherited_row[2];
+    let exposed = light.elements.exposed(leaf);
+    if exposed < 1.0 {
+        // What is seen from the middle of the leaf is nothing to what is open of it.
+        return Placed { inherited, row: row.capped(exposed), exposed };
+    }
     let mut own: SmallVec<[u32; 64]> = SmallVec::new();
     if element.is_flat() {
         own.extend(links.of(leaf).iter().map(|link| link.sender).filter(|&s| light.element(s).kind != Kind::Cluster));
         own.sort_unstable();
     }
     let seen = look_around(light, element.source, &points, leaf, 0.0, |sender| own.binary_search(&sender).is_ok());
-    Placed { inherited, row: row.correction(&seen) }
+    Placed { inherited, row: row.correction(&seen), exposed }
 }
 
 /// Direction and change of irradiance of a link's light as seen from a point inside of the node that received it.

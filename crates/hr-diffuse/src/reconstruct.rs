@@ -33,6 +33,8 @@ const PARTIAL_SHARE: f32 = 0.002;
 const WHOLE_SHARE: f32 = 0.01;
 /// What is nearer to a vertex than this share of its leaf's radius, all around, covers it.
 const COVER: f32 = 0.25;
+/// Vertices that a thread gathers between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 128;
 /// Most finer levels that a neighbour may have.
 const EDGE_DEPTH: u32 = 14;
 
@@ -231,7 +233,7 @@ fn along_edge(a: Vec2, b: Vec2, depth: u32, find: &impl Fn(Vec2) -> Option<u32>,
 }
 
 /// Builds the vertices of a solution and gathers their irradiance. Returns them and the number of rays shot.
-/// `watch` is told the share that is done; once it breaks, visibility is that of the links.
+/// `watch` is told the share that is done; once it breaks, the others take the mean irradiance of the leaves around.
 pub(crate) fn reconstruct<L: LightField>(
     light: Light<'_, L>,
     links: &Links,
@@ -240,22 +242,35 @@ pub(crate) fn reconstruct<L: LightField>(
     let mut vertices = lay_out(light.scene, light.elements);
     let count = vertices.positions.len();
     let mut rays = 0;
-    let mut renew = true;
-    let chunk = (count / 50).max(2048);
+    let chunk = BETWEEN_WATCHES * rayon::current_num_threads();
     let mut covered = Vec::with_capacity(count);
     for start in (0..count).step_by(chunk) {
+        if watch(start as f32 / count as f32).is_break() {
+            for vertex in start..count {
+                let around = vertices.leaves_around(vertex as u32);
+                let sum: Rgb = around.iter().map(|&leaf| light.exitant.irradiance[leaf as usize]).sum();
+                vertices.irradiance[vertex] = sum / around.len().max(1) as f32;
+            }
+            covered.resize(count, false);
+            break;
+        }
         let end = (start + chunk).min(count);
         let part: Vec<Gathering> = (start..end)
             .into_par_iter()
             .with_min_len(16)
-            .map(|vertex| gather_at(light, links, vertices.leaf[vertex], vertices.uv[vertex], vertex as u32, renew))
+            .map(|vertex| {
+                let around = vertices.leaves_around(vertex as u32);
+                if around.iter().all(|&leaf| light.element(leaf).importance <= 0.0) {
+                    return Gathering::default();
+                }
+                gather_at(light, links, vertices.leaf[vertex], vertices.uv[vertex], vertex as u32)
+            })
             .collect();
         for (vertex, gathering) in (start..end).zip(part) {
             rays += u64::from(gathering.rays);
             vertices.irradiance[vertex] = gathering.irradiance;
             covered.push(gathering.covered);
         }
-        renew &= watch(end as f32 / count as f32).is_continue();
     }
     uncover(&mut vertices, &covered);
     (vertices, rays)
@@ -283,14 +298,7 @@ fn uncover(vertices: &mut Vertices, covered: &[bool]) {
 }
 
 /// Irradiance at a point of a leaf, gathered over all links that light it.
-fn gather_at<L: LightField>(
-    light: Light<'_, L>,
-    links: &Links,
-    leaf: u32,
-    uv: Vec2,
-    seed: u32,
-    renew: bool,
-) -> Gathering {
+fn gather_at<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, uv: Vec2, seed: u32) -> Gathering {
     let element = light.element(leaf);
     let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET));
@@ -320,7 +328,7 @@ fn gather_at<L: LightField>(
     for Arriving { irradiance, share: view, mut visibility, sender } in arriving {
         let share = irradiance.max_element() / total;
         let partial = visibility > 0.0 && visibility < 1.0;
-        let renewed = renew && visibility >= 0.0 && share > if partial { PARTIAL_SHARE } else { WHOLE_SHARE };
+        let renewed = visibility >= 0.0 && share > if partial { PARTIAL_SHARE } else { WHOLE_SHARE };
         if renewed {
             renewed_here.push(sender);
             let count = (share * RAYS).clamp(1.0, MOST_RAYS) as u32;
@@ -342,7 +350,8 @@ fn gather_at<L: LightField>(
     Gathering { irradiance: placed.irradiance(own, kept), rays, covered: seen.covered }
 }
 
-/// What was gathered at a vertex.
+/// What was gathered at a vertex; nothing where only black surfaces meet.
+#[derive(Default)]
 struct Gathering {
     irradiance: Rgb,
     rays: u32,

@@ -34,6 +34,8 @@ const FACTOR_SHARE: f32 = 0.05;
 const FACTOR_ERROR: [f32; 2] = [0.02, 0.1];
 /// … and points of the receiver that it is worth.
 const FACTOR_POINTS: u32 = 16;
+/// Pairs that a thread decides upon between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 128;
 /// Segments per link: first a few, then as many as its light is worth.
 const FIRST_SEGMENTS: u32 = 4;
 const MOST_SEGMENTS: u32 = 32;
@@ -92,8 +94,24 @@ struct Counters {
     nanoseconds: AtomicU64,
 }
 
-/// Refines `links` and `unlit` pairs until each is within tolerance. `watch` is asked before each wave with the
-/// number of pairs in it; once it breaks, pairs are linked as they are.
+/// A pair to decide upon.
+#[derive(Clone, Copy)]
+struct Candidate {
+    pair: Pair,
+    /// The pair's own link, or that of the pair that it is a part of.
+    link: Option<Link>,
+}
+
+impl Candidate {
+    /// The pair's own link, if it has one.
+    fn own(&self) -> Option<Link> {
+        self.link.filter(|link| link.receiver == self.pair.receiver && link.sender == self.pair.sender)
+    }
+}
+
+/// Refines `links` and `unlit` pairs until each is within tolerance. `watch` is asked every few milliseconds with the
+/// number of pairs in a wave and of links; once it breaks, pairs keep the link that they come from, or are linked as
+/// they are.
 pub(crate) fn refine<L: LightField>(
     light: &mut MutableLight<'_, L>,
     links: Vec<Link>,
@@ -102,26 +120,30 @@ pub(crate) fn refine<L: LightField>(
     watch: &mut dyn FnMut(u64, u64) -> ControlFlow<()>,
 ) -> Refined {
     let mut refined = Refined::default();
-    let mut wave: Vec<(Pair, Option<Link>)> =
-        links.into_iter().map(|l| (Pair { receiver: l.receiver, sender: l.sender }, Some(l))).collect();
-    wave.extend(unlit.into_iter().map(|pair| (pair, None)));
+    let mut wave: Vec<Candidate> = links
+        .into_iter()
+        .map(|l| Candidate { pair: Pair { receiver: l.receiver, sender: l.sender }, link: Some(l) })
+        .collect();
+    wave.extend(unlit.into_iter().map(|pair| Candidate { pair, link: None }));
     let counters = Counters::default();
     while !wave.is_empty() {
-        if !refined.stopped && watch(wave.len() as u64, refined.links.len() as u64).is_break() {
-            refined.stopped = true;
-        }
-        let stopped = refined.stopped;
         refined.pairs += wave.len() as u64;
         let reader = light.read();
-        let verdicts: Vec<Verdict> = wave
-            .par_iter()
-            .with_min_len(64)
-            .map(|(pair, old)| decide(reader, *pair, *old, tolerance, stopped, &counters))
-            .collect();
+        let mut verdicts: Vec<Verdict> = Vec::with_capacity(wave.len());
+        for part in wave.chunks(BETWEEN_WATCHES * rayon::current_num_threads()) {
+            refined.stopped = refined.stopped || watch(wave.len() as u64, refined.links.len() as u64).is_break();
+            let stopped = refined.stopped;
+            let decided = part.par_iter().with_min_len(32).map(|candidate| {
+                let inherited = if stopped { inherited(reader, candidate) } else { None };
+                let decided = || decide(reader, candidate.pair, candidate.own(), tolerance, stopped, &counters);
+                inherited.map_or_else(decided, Verdict::Keep)
+            });
+            verdicts.par_extend(decided);
+        }
         split_elements(light, &wave, &verdicts);
         let elements = &*light.elements;
         let mut next = Vec::new();
-        for ((pair, _), verdict) in wave.iter().zip(&verdicts) {
+        for (Candidate { pair, link }, verdict) in wave.iter().zip(&verdicts) {
             let parts = |node: u32| {
                 let e = &elements.nodes[node as usize];
                 e.first_child..e.first_child + e.child_count
@@ -138,12 +160,18 @@ pub(crate) fn refine<L: LightField>(
                     refined.links.push(*link);
                 }
                 Verdict::SplitReceiver => {
-                    next.extend(parts(pair.receiver).map(|receiver| (Pair { receiver, ..*pair }, None)));
+                    next.extend(
+                        parts(pair.receiver)
+                            .map(|receiver| Candidate { pair: Pair { receiver, ..*pair }, link: *link }),
+                    );
                 }
-                Verdict::SplitSender => next.extend(parts(pair.sender).map(|sender| (Pair { sender, ..*pair }, None))),
+                Verdict::SplitSender => next
+                    .extend(parts(pair.sender).map(|sender| Candidate { pair: Pair { sender, ..*pair }, link: *link })),
                 Verdict::SplitBoth => {
                     for receiver in parts(pair.receiver) {
-                        next.extend(parts(pair.sender).map(|sender| (Pair { receiver, sender }, None)));
+                        next.extend(
+                            parts(pair.sender).map(|sender| Candidate { pair: Pair { receiver, sender }, link: *link }),
+                        );
                     }
                 }
             }
@@ -178,8 +206,8 @@ impl<L: LightField> MutableLight<'_, L> {
     }
 }
 
-fn split_elements<L: LightField>(light: &mut MutableLight<'_, L>, wave: &[(Pair, Option<Link>)], verdicts: &[Verdict]) {
-    for ((pair, _), verdict) in wave.iter().zip(verdicts) {
+fn split_elements<L: LightField>(light: &mut MutableLight<'_, L>, wave: &[Candidate], verdicts: &[Verdict]) {
+    for (Candidate { pair, .. }, verdict) in wave.iter().zip(verdicts) {
         let nodes: SmallVec<[u32; 2]> = match verdict {
             Verdict::SplitReceiver => smallvec![pair.receiver],
             Verdict::SplitSender => smallvec![pair.sender],
@@ -212,6 +240,20 @@ fn split_elements<L: LightField>(light: &mut MutableLight<'_, L>, wave: &[(Pair,
             }
         }
     }
+}
+
+/// The link that a pair has where there is no time to look at it: its own, or its share of the one that it is a part of.
+fn inherited<L: LightField>(light: Light<'_, L>, candidate: &Candidate) -> Option<Link> {
+    let Candidate { pair, link } = *candidate;
+    let from = link?;
+    let (sender, whole) = (light.element(pair.sender), light.element(from.sender));
+    if sender.kind == Kind::Light && from.sender != pair.sender {
+        return None;
+    }
+    // A light without extent has no area, and no parts.
+    let share = if from.sender == pair.sender { 1.0 } else { sender.area / whole.area };
+    let visibility = if share < 1.0 { from.visibility.abs() } else { from.visibility };
+    Some(Link { receiver: pair.receiver, sender: pair.sender, factor: from.factor * share, visibility })
 }
 
 /// Irradiance interval of a pair, split by cause.

@@ -20,6 +20,9 @@ const REPRESENTATIVES: usize = 16;
 /// A leaf's light is reflected anew once its irradiance has changed by this share of the error asked for.
 const REFLECT_SHARE: f32 = 1.0;
 
+/// Leaves that a thread reflects between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 8;
+
 /// Leaves, and the area that each stands for.
 type Representatives = SmallVec<[(u32, f32); 16]>;
 
@@ -130,8 +133,9 @@ fn thinned(all: Vec<(u32, f32)>, seed: u32) -> Representatives {
 }
 
 impl<L: LightField> Solver<L> {
-    /// Reflects the light of the leaves that stand for what the links ask for, where it has changed. Tells whether any has.
-    pub(crate) fn reflect_senders(&mut self) -> bool {
+    /// Reflects the light of the leaves that stand for what the links ask for, where it has changed, until `watch` breaks.
+    /// Tells whether any has.
+    pub(crate) fn reflect_senders(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
         let count = self.elements.nodes.len();
         if !self.elements.nodes[0].active {
             return false;
@@ -142,7 +146,7 @@ impl<L: LightField> Solver<L> {
             faint[elements.nodes[leaf as usize].material as usize] == Rgb::ZERO
         });
         let leaves = senders.leaves(elements);
-        let changed = self.reflect(&leaves);
+        let changed = self.reflect(&leaves, watch);
         let mut stands = vec![false; count];
         for standing in leaves {
             stands[standing.leaf as usize] = true;
@@ -181,11 +185,12 @@ impl<L: LightField> Solver<L> {
         }
     }
 
-    /// The extension turns the incident light of leaves into exitant light where it has changed. Tells where.
-    fn reflect(&mut self, leaves: &[Standing]) -> Vec<u32> {
+    /// The extension turns the incident light of leaves into exitant light where it has changed, until `watch` breaks.
+    /// Tells where.
+    fn reflect(&mut self, leaves: &[Standing], watch: &mut dyn FnMut() -> ControlFlow<()>) -> Vec<u32> {
         let elements = &self.elements;
         let tolerance = REFLECT_SHARE * self.settings.error;
-        let changed: Vec<Standing> = leaves
+        let mut changed: Vec<Standing> = leaves
             .iter()
             .copied()
             .filter(|&Standing { leaf, .. }| {
@@ -195,22 +200,27 @@ impl<L: LightField> Solver<L> {
             })
             .collect();
         self.stats.skipped.converged_leaves += (leaves.len() - changed.len()) as u64;
-        let exitant: Vec<L::Exitant> = changed
-            .par_iter()
-            .map(|&Standing { leaf, spread }| {
-                let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
-                let mut node = leaf;
-                while node != 0 {
-                    node = elements.nodes[node as usize].parent;
-                    path.push(&self.incident[node as usize]);
-                }
-                path.reverse();
-                let element = &elements.nodes[leaf as usize];
-                let irradiance = self.exitant.irradiance[leaf as usize];
-                let diffuse = irradiance * element.reflectance * FRAC_1_PI;
-                self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse, spread })
-            })
-            .collect();
+        let reflect = |&Standing { leaf, spread }: &Standing| {
+            let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
+            let mut node = leaf;
+            while node != 0 {
+                node = elements.nodes[node as usize].parent;
+                path.push(&self.incident[node as usize]);
+            }
+            path.reverse();
+            let element = &elements.nodes[leaf as usize];
+            let irradiance = self.exitant.irradiance[leaf as usize];
+            let diffuse = irradiance * element.reflectance * FRAC_1_PI;
+            self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse, spread })
+        };
+        let mut exitant: Vec<L::Exitant> = Vec::with_capacity(changed.len());
+        for part in changed.chunks(BETWEEN_WATCHES * rayon::current_num_threads()) {
+            if watch().is_break() {
+                break;
+            }
+            exitant.par_extend(part.par_iter().map(reflect));
+        }
+        changed.truncate(exitant.len());
         for (Standing { leaf, .. }, exitant) in changed.iter().zip(exitant) {
             self.reflected[*leaf as usize] = exitant;
             self.last_reflected[*leaf as usize] = self.exitant.irradiance[*leaf as usize];
@@ -235,14 +245,17 @@ impl<L: LightField> Solver<L> {
         for Standing { leaf, .. } in &leaves {
             self.last_reflected[*leaf as usize] = Rgb::splat(f32::NEG_INFINITY);
         }
-        let chunk = (leaves.len() / 40).max(256);
-        for (i, part) in leaves.chunks(chunk).enumerate() {
-            let share = (i * chunk) as f32 / leaves.len() as f32;
-            if watch(&self.progress(Phase::Transport, 0.86 + 0.04 * share, 1.0)).is_break() {
-                break;
-            }
-            self.reflect(part);
-        }
+        let progress = self.progress(Phase::Transport, 0.86, 1.0);
+        let (mut done, mut stopped) = (0, false);
+        let chunk = BETWEEN_WATCHES * rayon::current_num_threads();
+        self.reflect(&leaves, &mut || {
+            let share = (done as f32 / leaves.len() as f32).min(1.0);
+            done += chunk;
+            let answer = watch(&Progress { fraction: progress.fraction + 0.04 * share, ..progress });
+            stopped |= answer.is_break();
+            answer
+        });
+        self.stats.stopped |= stopped;
         self.stats.seconds.reflect += start.elapsed().as_secs_f64();
     }
 

@@ -121,13 +121,21 @@ impl Default for Correction {
 }
 
 impl Row {
+    /// What keeps this row from exceeding `most`.
+    pub(crate) fn capped(&self, most: f32) -> Correction {
+        let sum = self.emitters + self.own + self.inherited;
+        Correction { all: if sum > most { most / sum } else { 1.0 }, ..Correction::default() }
+    }
+
     /// What makes this row what was seen: what is uncertain changes first, and emitters, whose links are fine, only where
-    /// they take up more than all there is.
+    /// they take up more than all there is, or less where there is nothing else.
     pub(crate) fn correction(&self, seen: &Seen) -> Correction {
         let mut correction = Correction::default();
+        // What is seen of emitters beyond those that have links of their own sends through the links of clusters.
+        let seen_inherited = seen.shares.inherited + (seen.shares.emitters - self.emitters).max(0.0);
         if self.inherited > 0.0 {
-            let hidden = seen.shares.inherited <= 0.0 && self.inherited > SURELY_SEEN;
-            let goal = if hidden { 0.0 } else { within_band(self.inherited, seen.shares.inherited) };
+            let hidden = seen_inherited <= 0.0 && self.inherited > SURELY_SEEN;
+            let goal = if hidden { 0.0 } else { within_band(self.inherited, seen_inherited) };
             correction.inherited = (goal / self.inherited).min(MOST_RAISE);
         }
         let rest = self.own + self.inherited * correction.inherited;
@@ -135,11 +143,14 @@ impl Row {
             let goal = if seen.closed {
                 (1.0 - self.emitters).max(0.0)
             } else {
-                within_band(rest, seen.shares.own + seen.shares.inherited)
+                within_band(rest, seen.shares.own + seen_inherited)
             };
             correction.rest = (goal / rest).min(MOST_RAISE);
         }
-        correction.all = (self.emitters + rest * correction.rest).max(1.0).recip();
+        // Where all of the view is senders it is known to be 1; what emitters lack of it is amplified by every reflection.
+        let sum = self.emitters + rest * correction.rest;
+        let least = if seen.closed { MOST_RAISE.recip() } else { 1.0 };
+        correction.all = sum.max(least).recip();
         correction
     }
 }

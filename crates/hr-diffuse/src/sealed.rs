@@ -36,25 +36,25 @@ const ABOVE: f32 = 1e-3;
 const NEAREST: usize = 6;
 
 /// A side of a surface: twice the surface's index, plus 1 for the back.
-type Side = u32;
+pub(crate) type Side = u32;
 
 /// For each surface, whether its front and its back may be lit. Where nothing is, everything counts as if it were: there
-/// is no light in the scene.
+/// is no light in the scene. `idle` surfaces hide light, and do nothing else with it.
 ///
 /// A side that sees lit ones in less than about a hundredth of its view may be missed.
-pub(crate) fn lit_sides(scene: &SceneData) -> Vec<[bool; 2]> {
+pub(crate) fn lit_sides(scene: &SceneData, idle: &[bool]) -> Vec<[bool; 2]> {
     let count = scene.surfaces().len();
     let mut spots = Spots::new(scene);
     // What emitters see is lit; few rays from elsewhere would find a small one.
     let emitters: Vec<u32> = (0..spots.all.len() as u32).filter(|&spot| spots.groups.is_lit(spot)).collect();
     let rays = (EMITTER_RAYS / emitters.len().max(1) as u32).clamp(16, 256);
-    spots.explore(scene, &emitters, 0..rays);
+    spots.explore(scene, idle, &emitters, 0..rays);
     let mut first = rays;
     for rays in ROUNDS {
         let dark: Vec<u32> = (0..spots.all.len() as u32)
-            .filter(|&spot| reflects(scene, spots.all[spot as usize].side) && !spots.groups.is_lit(spot))
+            .filter(|&spot| reflects(scene, idle, spots.all[spot as usize].side) && !spots.groups.is_lit(spot))
             .collect();
-        spots.explore(scene, &dark, first..first + rays);
+        spots.explore(scene, idle, &dark, first..first + rays);
         first += rays;
     }
     let mut is_lit = |side: usize| spots.of_side[side].iter().any(|&spot| spots.groups.is_lit(spot));
@@ -63,9 +63,9 @@ pub(crate) fn lit_sides(scene: &SceneData) -> Vec<[bool; 2]> {
 }
 
 /// Whether a side does anything with light.
-fn reflects(scene: &SceneData, side: Side) -> bool {
+fn reflects(scene: &SceneData, idle: &[bool], side: Side) -> bool {
     let material = &scene.materials[scene.surface_materials[(side / 2) as usize] as usize];
-    side.is_multiple_of(2) || material.two_sided
+    !idle[(side / 2) as usize] && (side.is_multiple_of(2) || material.two_sided)
 }
 
 /// A place on a side, which stands for what is around it.
@@ -82,7 +82,7 @@ struct Seen {
     light: bool,
 }
 
-fn look(scene: &SceneData, spot: &Spot, seed: u32, rays: std::ops::Range<u32>) -> Seen {
+fn look(scene: &SceneData, idle: &[bool], spot: &Spot, seed: u32, rays: std::ops::Range<u32>) -> Seen {
     let surface = spot.side / 2;
     let geometry = &scene.surfaces()[surface as usize];
     let mut seen = Seen { met: Vec::new(), light: false };
@@ -96,8 +96,7 @@ fn look(scene: &SceneData, spot: &Spot, seed: u32, rays: std::ops::Range<u32>) -
             (spot.at, spot.normal)
         };
         let (a, b) = n.any_orthonormal_pair();
-        let (sin, cos) = (TAU * u.z).sin_cos();
-        let direction = (a * cos + b * sin) * u.w.sqrt() + n * (1.0 - u.w).sqrt();
+        let direction = cosine_direction(n, u.z, u.w);
         // Between surfaces that nearly meet single rays slip through: what is seen must be seen a little beside, too.
         let met = [Vec3::ZERO, a * BESIDE, b * BESIDE]
             .map(|beside| scene.visibility.closest_except(x, direction + beside, 0.0, f32::MAX, surface));
@@ -105,16 +104,12 @@ fn look(scene: &SceneData, spot: &Spot, seed: u32, rays: std::ops::Range<u32>) -
         if let [Some(hit), Some(second), Some(third)] = &met
             && side(hit) == side(second)
             && side(hit) == side(third)
-            && reflects(scene, side(hit))
+            && reflects(scene, idle, side(hit))
         {
             let normal = if hit.front { hit.normal } else { -hit.normal };
             seen.met.push(Spot { side: side(hit), at: hit.point, normal });
         }
-        let mut blocker = u32::MAX;
-        seen.light |= (0..scene.lights.len()).any(|light| {
-            let (to, cosine): (Vec3, f32) = light_segment(scene, light, x, n);
-            cosine > 0.0 && !scene.visibility.occluded(x, to, [surface, u32::MAX], &mut blocker)
-        });
+        seen.light |= sees_light(scene, surface, x, n, |_| true);
     }
     seen
 }
@@ -154,8 +149,8 @@ impl Spots {
     }
 
     /// Joins spots to what rays from them meet.
-    fn explore(&mut self, scene: &SceneData, spots: &[u32], rays: std::ops::Range<u32>) {
-        let look = |&spot: &u32| look(scene, &self.all[spot as usize], spot, rays.clone());
+    fn explore(&mut self, scene: &SceneData, idle: &[bool], spots: &[u32], rays: std::ops::Range<u32>) {
+        let look = |&spot: &u32| look(scene, idle, &self.all[spot as usize], spot, rays.clone());
         let seen: Vec<Seen> = spots.par_iter().map(look).collect();
         for (&spot, seen) in spots.iter().zip(&seen) {
             for met in &seen.met {
@@ -218,14 +213,40 @@ impl Spots {
     }
 }
 
-/// Disjoint sets of spots, by union with path halving; a set is lit if any of its members is.
+/// A direction about a unit normal, drawn by its cosine.
+pub(crate) fn cosine_direction(n: Vec3, u: f32, v: f32) -> Vec3 {
+    let (a, b) = n.any_orthonormal_pair();
+    let (sin, cos) = (TAU * u).sin_cos();
+    (a * cos + b * sin) * v.sqrt() + n * (1.0 - v).sqrt()
+}
+
+/// Whether a point of a surface with normal `n` sees one of those lights without extent that are `wanted`.
+pub(crate) fn sees_light(
+    scene: &SceneData,
+    surface: u32,
+    x: Vec3,
+    n: Vec3,
+    wanted: impl Fn(&crate::Light) -> bool,
+) -> bool {
+    let mut blocker = u32::MAX;
+    scene.lights.iter().enumerate().filter(|(_, light)| wanted(light)).any(|(light, _)| {
+        let (to, cosine) = light_segment(scene, light, x, n);
+        cosine > 0.0 && !scene.visibility.occluded(x, to, [surface, u32::MAX], &mut blocker)
+    })
+}
+
+/// Disjoint sets, by union with path halving; a set is lit if any of its members is.
 #[derive(Default)]
-struct Groups {
+pub(crate) struct Groups {
     parent: Vec<u32>,
     lit: Vec<bool>,
 }
 
 impl Groups {
+    pub(crate) fn new(count: usize) -> Self {
+        Self { parent: (0..count as u32).collect(), lit: vec![false; count] }
+    }
+
     fn add(&mut self, lit: bool) -> u32 {
         let id = self.parent.len() as u32;
         self.parent.push(id);
@@ -233,26 +254,26 @@ impl Groups {
         id
     }
 
-    fn root(&mut self, mut spot: u32) -> usize {
-        while self.parent[spot as usize] != spot {
-            let above = self.parent[self.parent[spot as usize] as usize];
-            self.parent[spot as usize] = above;
-            spot = above;
+    pub(crate) fn root(&mut self, mut member: u32) -> usize {
+        while self.parent[member as usize] != member {
+            let above = self.parent[self.parent[member as usize] as usize];
+            self.parent[member as usize] = above;
+            member = above;
         }
-        spot as usize
+        member as usize
     }
 
-    fn is_lit(&mut self, spot: u32) -> bool {
-        let root = self.root(spot);
+    pub(crate) fn is_lit(&mut self, member: u32) -> bool {
+        let root = self.root(member);
         self.lit[root]
     }
 
-    fn light(&mut self, spot: u32) {
-        let root = self.root(spot);
+    pub(crate) fn light(&mut self, member: u32) {
+        let root = self.root(member);
         self.lit[root] = true;
     }
 
-    fn join(&mut self, a: u32, b: u32) {
+    pub(crate) fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.lit[a] |= self.lit[b];
         self.parent[b] = a as u32;

@@ -97,7 +97,7 @@ pub(crate) fn visibility<L: LightField>(
                     let to = s.at - r.at;
                     let d2 = to.length_squared();
                     let (a, b) = (to.dot(r.normal), -to.dot(s.normal));
-                    let weight = if a > 0.0 && b > 0.0 && d2 > 0.0 { a * b / (d2 * (d2 + s.area)) } else { 0.0 };
+                    let weight = if a > 0.0 && b > 0.0 && d2 > 0.0 { kernel(a * b, d2, s.area) } else { 0.0 };
                     (s.at, weight, s.surface)
                 }
             };
@@ -112,6 +112,12 @@ pub(crate) fn visibility<L: LightField>(
         }
     }
     (seen, total, rays)
+}
+
+/// The transfer's kernel by the product of both cosines × distance, the squared distance and the sender's area. Surfaces
+/// may be so small and near that its square is 0 in f32.
+fn kernel(product: f32, d2: f32, area: f32) -> f32 {
+    product / d2 / (d2 + area).max(1e-30)
 }
 
 /// Whether any of `count` random pairs of points on two nodes face each other. Neighbouring parts of a convex object,
@@ -169,7 +175,7 @@ pub(crate) fn visibility_at<L: LightField>(
         let d2 = to.length_squared();
         let (a, b) = (to.dot(n), -to.dot(s.normal));
         if a > 0.0 && b > 0.0 && d2 > 0.0 {
-            let weight = a * b / (d2 * (d2 + s.area));
+            let weight = kernel(a * b, d2, s.area);
             total += weight;
             if !scene.visibility.occluded(x, s.at, [surface, s.surface], &mut blocker) {
                 seen += weight;

@@ -38,15 +38,20 @@ pub struct Solution<L: LightField = ()> {
 }
 
 impl<L: LightField> Solver<L> {
-    /// Makes the solution ready for display: values at vertices. Where `watch` breaks, visibility is not renewed
-    /// any more.
+    /// Makes the solution ready for display: values at vertices. Where `watch` breaks, those that are left take the mean of
+    /// the elements around them.
     pub fn finish(mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Solution<L> {
         let start = Instant::now();
         let (links, nodes) = (self.links.all().len() as u64, self.elements.nodes.len() as u64);
         let error = self.settings.error;
+        let mut stopped = false;
         let (vertices, rays) = reconstruct(self.light(), &self.links, &mut |share| {
-            watch(&Progress { phase: Phase::Reconstruct, fraction: 0.9 + 0.1 * share, error, links, nodes })
+            let answer =
+                watch(&Progress { phase: Phase::Reconstruct, fraction: 0.9 + 0.1 * share, error, links, nodes });
+            stopped |= answer.is_break();
+            answer
         });
+        self.stats.stopped |= stopped;
         self.stats.vertex_rays += rays;
         self.stats.seconds.reconstruct += start.elapsed().as_secs_f64();
         Solution {

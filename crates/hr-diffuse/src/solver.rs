@@ -1,6 +1,7 @@
 //! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
 
 use crate::columns::{FREELY, STRICTLY, gains};
+use crate::convergence::Convergence;
 use crate::error::SolveError;
 use crate::exposed::expose;
 use crate::geometry::{Geometry, Normalization};
@@ -11,9 +12,12 @@ use crate::place::{Class, Gathered, Placed, place, renewed};
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
 use crate::stats::Stats;
+use crate::steady;
 use crate::transport::{Exitant, Light};
+use crate::twins::twins;
 use crate::visibility::Visibility;
 use crate::{Facing, LightKind, Rgb, SceneInput};
+use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -32,8 +36,17 @@ const FAINT_SHARE: f32 = 0.7;
 const CONVERGED_SHARE: f32 = 0.02;
 /// The first pass that reflects the extension's light: before it, there is little light to reflect.
 const FIRST_REFLECTED: usize = 2;
+/// Nodes whose links a thread gathers between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 1024;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
+
+/// Exitances and intensities above this are refused: sums of powers and what white surfaces make of them would leave the
+/// range of f32.
+const MOST_LIGHT: f32 = 1e30;
+
+/// Channels with less than this share of the strongest one's light need not converge by themselves.
+const FAINT_CHANNEL: f64 = 1e-3;
 
 /// What is asked of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,14 +122,15 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) brightest: Vec<f32>,
     /// Area whose light counts.
     area: f32,
+    convergence: Convergence,
 }
 
 impl<L: LightField> Solver<L> {
     /// Checks a scene and builds its hierarchy.
     ///
     /// # Errors
-    /// A [`SolveError`] where the scene is empty, or some surface, material, light or the error asked for makes no
-    /// sense.
+    /// A [`SolveError`] where the scene is empty, some surface, material, light or the error asked for makes no
+    /// sense, or light would grow without end ([`SolveError::NoSteadyState`]).
     pub fn new(input: &SceneInput, settings: Settings, field: L) -> Result<Self, SolveError> {
         let start = Instant::now();
         if !(0.001..=1.0).contains(&settings.error) {
@@ -130,6 +144,7 @@ impl<L: LightField> Solver<L> {
                 None => (Rgb::ZERO, Rgb::ZERO),
             })
             .unzip();
+        steady::check(&scene, |material| field.active(material).unwrap_or(Rgb::ZERO))?;
         let elements = Elements::build(&scene, |material| field.active(material));
         let count = elements.nodes.len();
         let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
@@ -164,6 +179,7 @@ impl<L: LightField> Solver<L> {
             most_reflected: FREELY,
             brightest: Vec::new(),
             area,
+            convergence: Convergence::default(),
         };
         solver.pull();
         solver.stats.skipped.sealed_sides = solver.elements.sealed_sides();
@@ -171,27 +187,37 @@ impl<L: LightField> Solver<L> {
         Ok(solver)
     }
 
-    /// Solves. `watch` is told how far it is and may break: then what there is is finished quickly, without
-    /// refining any more.
+    /// Solves. `watch` is told how far it is every few milliseconds, and may break: then the solution is what there is by
+    /// then, and [`Stats::stopped`] is set. Budgets of time and memory are its business: a link takes 16 bytes, an
+    /// element about 400 and what the extension keeps of it.
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
         for (pass, looseness) in PASSES.iter().chain(std::iter::repeat(&1.0)).enumerate().take(PASSES.len() + 1) {
             let last = pass + 1 >= PASSES.len();
             let changed = self.refine(pass, *looseness, &mut stopped, watch);
-            let goal = if last || stopped { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
-            let most = if last || stopped { MOST_ITERATIONS } else { 3 };
+            let goal = if last { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
+            let most = if last { MOST_ITERATIONS } else { 3 };
+            if stopped {
+                // New elements have their parents' light.
+                break;
+            }
             for iteration in 0..most {
+                let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
+                let progress = self.progress(Phase::Transport, fraction, *looseness);
+                let ask = &mut || {
+                    stopped = stopped || watch(&progress).is_break();
+                    if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                };
                 // Once the light is there, and what is linked is fine enough.
-                if iteration == 1 && pass + 1 >= PASSES.len() {
-                    self.place();
+                let places = last && iteration == if pass < PASSES.len() { 1 } else { 0 };
+                if places {
+                    self.place(ask);
                 }
-                let residual = self.iterate(pass >= FIRST_REFLECTED);
+                let Some(residual) = self.iterate(pass >= FIRST_REFLECTED, ask) else { break };
                 if self.grows() {
                     self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
                 }
-                let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
-                stopped |= watch(&self.progress(Phase::Transport, fraction, *looseness)).is_break();
-                if self.remaining(residual) < goal || stopped && iteration > 0 {
+                if stopped || self.remaining(residual) < goal && (places || iteration > 0) {
                     break;
                 }
             }
@@ -199,6 +225,11 @@ impl<L: LightField> Solver<L> {
                 break;
             }
         }
+        if self.stats.iterations == 0 {
+            // Whenever it was stopped, there is some light.
+            self.iterate(false, &mut || ControlFlow::Continue(()));
+        }
+        self.stats.stopped = stopped;
         self.stats.nodes = self.elements.nodes.len() as u64;
         self.stats.leaves = self.elements.patch_leaves().count() as u64;
         self.stats.links = self.links.all().len() as u64;
@@ -219,9 +250,9 @@ impl<L: LightField> Solver<L> {
             smallest: SMALLEST_SHARE * self.settings.error.sqrt(),
         };
         let error = self.believed_error(looseness);
+        self.convergence.restart();
         let (links, unlit) = (self.links.take(), std::mem::take(&mut self.unlit));
         let nodes = self.elements.nodes.len() as u64;
-        let already = *stopped;
         let mut light = MutableLight {
             scene: &self.scene,
             elements: &mut self.elements,
@@ -232,9 +263,6 @@ impl<L: LightField> Solver<L> {
         };
         let mut wave_number = 0.0_f32;
         let refined = refine(&mut light, links, unlit, tolerance, &mut |wave, done| {
-            if already {
-                return ControlFlow::Break(());
-            }
             wave_number += 1.0;
             let fraction = progress_fraction(pass, 0.8 * wave_number / (wave_number + 8.0));
             watch(&Progress { phase: Phase::Refine, fraction, error, links: wave + done, nodes })
@@ -254,33 +282,53 @@ impl<L: LightField> Solver<L> {
     }
 
     /// One iteration of the paper: gather, push, reflect, pull. Returns the change of the mean radiosity, relative
-    /// to it.
-    fn iterate(&mut self, reflects: bool) -> f32 {
+    /// to it; `None`, and no change, where `watch` broke before the light was gathered.
+    fn iterate(&mut self, reflects: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Option<f32> {
         let before: Vec<Rgb> = self.exitant.irradiance.clone();
         let start = Instant::now();
-        self.gather();
+        if self.gather(watch).is_break() {
+            return None;
+        }
         self.push();
+        let residual = self.extrapolate(&before);
         let middle = Instant::now();
-        if reflects && self.reflect_senders() {
+        if reflects && self.reflect_senders(watch) {
             self.exitant.gain = gains(self.light(), &self.links, self.most_reflected);
         }
         let end = Instant::now();
         self.pull();
         self.stats.seconds.transport += (middle - start).as_secs_f64() + end.elapsed().as_secs_f64();
         self.stats.seconds.reflect += (end - middle).as_secs_f64();
-        let (mut change, mut total) = (0.0_f64, 0.0_f64);
+        self.stats.iterations += 1;
+        self.stats.residuals.push(residual);
+        Some(residual)
+    }
+
+    /// Adds what the iterations to come would, where that is known. Returns the change since `before`, relative to the
+    /// light there is: that of the channel that changed most.
+    fn extrapolate(&mut self, before: &[Rgb]) -> f32 {
+        let (mut change, mut moved, mut total) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
         for leaf in self.elements.patch_leaves() {
             let (element, leaf) = (&self.elements.nodes[leaf as usize], leaf as usize);
             let weight = f64::from(element.area * element.importance);
             let now = self.exitant.irradiance[leaf];
-            let delta = (now - before[leaf]).abs();
-            change += weight * f64::from(delta.element_sum());
-            total += weight * f64::from(now.element_sum());
+            let delta = (now - before[leaf]).as_dvec3();
+            change += weight * delta;
+            moved += weight * delta.abs();
+            total += weight * now.as_dvec3();
         }
-        let residual = if total > 0.0 { (change / total) as f32 } else { 0.0 };
-        self.stats.iterations += 1;
-        self.stats.residuals.push(residual);
-        residual
+        // Directional light comes in steps, when it is reflected anew: those are no series.
+        let ahead = if self.elements.nodes[0].active { Rgb::ZERO } else { self.convergence.ahead(change) };
+        if ahead != Rgb::ZERO {
+            let leaves: Vec<u32> = self.elements.patch_leaves().collect();
+            for leaf in leaves {
+                let now = &mut self.exitant.irradiance[leaf as usize];
+                *now = (*now + (*now - before[leaf as usize]) * ahead).max(Rgb::ZERO);
+            }
+        }
+        // Channels in which there is next to nothing need not converge by themselves.
+        let total = total.max(DVec3::splat(FAINT_CHANNEL * total.max_element()));
+        if total.max_element() > 0.0 { (moved / total).max_element() as f32 } else { 0.0 }
     }
 
     /// Read access to hierarchy and exitant light.
@@ -295,7 +343,7 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Every receiver adds up what its links carry, in parallel, each on its own state.
-    fn gather(&mut self) {
+    fn gather(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> ControlFlow<()> {
         let count = self.elements.nodes.len();
         let mut own = std::mem::take(&mut self.own);
         let mut transfers = std::mem::take(&mut self.transfers);
@@ -303,35 +351,48 @@ impl<L: LightField> Solver<L> {
         own.resize(count, Gathered::default());
         transfers.resize_with(count, Vec::new);
         let (light, links, field) = (self.light(), &self.links, &self.field);
-        own.par_iter_mut().zip(&mut transfers).zip(&mut incident).enumerate().with_min_len(64).for_each(
-            |(node, ((own, transfers), incident))| {
-                *own = Gathered::default();
-                transfers.clear();
-                let element = light.element(node as u32);
+        let gather = |node: usize, own: &mut Gathered, transfers: &mut Vec<Transfer>, incident: &mut L::Incident| {
+            *own = Gathered::default();
+            transfers.clear();
+            let element = light.element(node as u32);
+            if element.active {
+                field.clear(incident);
+            }
+            let flat = element.is_flat();
+            for link in links.of(node as u32) {
+                let direction = light.direction_to(element.center, link.sender);
+                let visible = link.factor * link.visibility.abs();
+                let irradiance = light.emitted(link.sender, -direction) * visible;
+                if irradiance.max_element() <= 0.0 {
+                    continue;
+                }
+                let transfer = Transfer { sender: NodeId(link.sender), direction, irradiance, oriented: flat };
+                if flat {
+                    *own.of(Class::of(light, link.sender)) += irradiance;
+                } else {
+                    transfers.push(transfer);
+                }
                 if element.active {
-                    field.clear(incident);
+                    field.receive(incident, &transfer);
                 }
-                let flat = element.is_flat();
-                for link in links.of(node as u32) {
-                    let direction = light.direction_to(element.center, link.sender);
-                    let visible = link.factor * link.visibility.abs();
-                    let irradiance = light.emitted(link.sender, -direction) * visible;
-                    if irradiance.max_element() <= 0.0 {
-                        continue;
-                    }
-                    let transfer = Transfer { sender: NodeId(link.sender), direction, irradiance, oriented: flat };
-                    if flat {
-                        *own.of(Class::of(light, link.sender)) += irradiance;
-                    } else {
-                        transfers.push(transfer);
-                    }
-                    if element.active {
-                        field.receive(incident, &transfer);
-                    }
-                }
-            },
-        );
+            }
+        };
+        let chunk = BETWEEN_WATCHES * rayon::current_num_threads();
+        let mut answer = ControlFlow::Continue(());
+        for first in (0..count).step_by(chunk) {
+            answer = watch();
+            if answer.is_break() {
+                break;
+            }
+            let part = first..(first + chunk).min(count);
+            let nodes = own[part.clone()].par_iter_mut().zip(&mut transfers[part.clone()]).zip(&mut incident[part]);
+            nodes
+                .enumerate()
+                .with_min_len(64)
+                .for_each(|(i, ((own, transfers), incident))| gather(first + i, own, transfers, incident));
+        }
         (self.own, self.transfers, self.incident) = (own, transfers, incident);
+        answer
     }
 
     /// Hands light down to the leaves: the sum of what their ancestors received. Light on nodes that are not flat
@@ -361,11 +422,7 @@ impl<L: LightField> Solver<L> {
                     node = elements.nodes[node as usize].parent;
                 }
                 let placed = self.placed.get(leaf as usize).copied().unwrap_or_default();
-                let exposed = elements.exposed(leaf);
-                if exposed <= 0.0 {
-                    return Rgb::ZERO;
-                }
-                placed.irradiance(self.own[leaf as usize], inherited) / exposed
+                placed.irradiance(self.own[leaf as usize], inherited)
             })
             .collect();
         for (leaf, sum) in leaves.into_iter().zip(sums) {
@@ -374,14 +431,16 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Finds out what the places of the leaves make of the light on their ancestors, where links are new.
-    fn place(&mut self) {
+    fn place(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         let start = Instant::now();
         let hashes = self.links.hashes(&self.elements);
         let mut placed = std::mem::take(&mut self.placed);
-        let before = std::mem::replace(&mut self.placed_for, hashes);
-        let stale = |leaf: u32| before.get(leaf as usize) != Some(&self.placed_for[leaf as usize]);
-        place(self.light(), &self.links, self.settings.error, stale, &mut placed);
+        let stale = |leaf: u32| self.placed_for.get(leaf as usize) != Some(&hashes[leaf as usize]);
+        if place(self.light(), &self.links, self.settings.error, stale, &mut placed, watch) {
+            self.placed_for = hashes;
+        }
         self.placed = placed;
+        self.convergence.restart();
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 
@@ -466,12 +525,10 @@ impl<L: LightField> Solver<L> {
         last.len() == 4 && last.windows(2).all(|pair| pair[1] > pair[0])
     }
 
-    /// What all iterations to come would change, if the residuals go on shrinking as they did last: the sum of the
-    /// geometric series.
+    /// What all iterations to come would change.
     fn remaining(&self, residual: f32) -> f32 {
         let before = self.stats.residuals.iter().rev().nth(1).copied().unwrap_or(f32::INFINITY);
-        let rate = (residual / before).clamp(0.0, 0.999);
-        if before.is_finite() { residual * (rate / (1.0 - rate)).max(0.1) } else { residual }
+        self.convergence.remaining(residual, before)
     }
 
     fn believed_error(&self, looseness: f32) -> f32 {
@@ -512,6 +569,9 @@ fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
         if !e.is_finite() || e.min_element() < 0.0 {
             return wrong("exitance", e, "not negative");
         }
+        if e.max_element() > MOST_LIGHT {
+            return wrong("exitance", e, "at most 1e30 W/m²");
+        }
     }
     for (surface, s) in input.surfaces.iter().enumerate() {
         if s.material as usize >= input.materials.len() {
@@ -539,16 +599,27 @@ fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
             return Err(SolveError::Light { light, what: "it is too far from the scene; make it a directional light" });
         }
     }
-    let lights = input.lights.iter().map(|l| match l.kind {
-        LightKind::Directional { .. } => *l,
-        _ => crate::Light { intensity: l.intensity * scale2, ..*l },
-    });
+    let lights: Vec<crate::Light> = input
+        .lights
+        .iter()
+        .map(|l| match l.kind {
+            LightKind::Directional { .. } => *l,
+            _ => crate::Light { intensity: l.intensity * scale2, ..*l },
+        })
+        .collect();
+    // In a scene of micrometres a light of kilowatts is beyond f32.
+    if let Some(light) = lights.iter().position(|l| l.intensity.max_element() > MOST_LIGHT) {
+        return Err(SolveError::Light { light, what: "it is too strong for the size of the scene" });
+    }
+    let surface_materials: Vec<u32> = input.surfaces.iter().map(|s| s.material).collect();
+    let twins = twins(&surfaces, &surface_materials);
     Ok(SceneData {
-        visibility: Visibility::new(&surfaces),
-        surface_materials: input.surfaces.iter().map(|s| s.material).collect(),
+        visibility: Visibility::with_twins(&surfaces, &twins),
+        surface_materials,
+        twins,
         shading_normals: input.surfaces.iter().map(|s| s.shading_normals).collect(),
         materials: input.materials.clone(),
-        lights: lights.collect(),
+        lights,
         light_positions: input.lights.iter().map(|l| normalization.to_unit(l.position)).collect(),
         texture: input.texture.clone(),
         normalization,

@@ -21,6 +21,8 @@ pub struct Stats {
     pub iterations: u32,
     /// Change of the mean radiosity by each iteration, relative to its value.
     pub residuals: Vec<f32>,
+    /// Whether it was told to stop before it was done: the solution is what there was by then.
+    pub stopped: bool,
     /// What was skipped, and why.
     pub skipped: Skipped,
     /// Seconds by phase.

@@ -133,7 +133,14 @@ impl Visibility {
     /// Builds the tree. Surface ids are indices into `geometries`.
     #[must_use]
     pub fn new(geometries: &[Geometry]) -> Self {
-        let groups = Groups::new(geometries);
+        let each: Vec<u32> = (0..geometries.len() as u32).collect();
+        Self::with_twins(geometries, &each)
+    }
+
+    /// Like [`new`](Self::new), but rays meet only those surfaces that are their own `first`: the others coincide with
+    /// theirs.
+    pub(crate) fn with_twins(geometries: &[Geometry], first: &[u32]) -> Self {
+        let groups = Groups::new(geometries, first);
         let bvh = groups.tree();
         let mut visibility = Self {
             geometries: geometries.to_vec(),
@@ -145,6 +152,9 @@ impl Visibility {
         };
         if !bvh.nodes.is_empty() {
             visibility.collapse(&bvh, &groups);
+        }
+        for (surface, &twin) in first.iter().enumerate() {
+            visibility.primitive_of[surface] = visibility.primitive_of[twin as usize];
         }
         visibility
     }
@@ -382,10 +392,10 @@ impl Boundable for GroupBox {
 }
 
 impl Groups {
-    fn new(geometries: &[Geometry]) -> Self {
+    fn new(geometries: &[Geometry], first: &[u32]) -> Self {
         // In order of the boxes' bits: no hashing, thus the same tree every time.
         let mut groups: BTreeMap<[u32; 6], (Aabb, Vec<u32>)> = BTreeMap::new();
-        for (surface, geometry) in geometries.iter().enumerate() {
+        for (surface, geometry) in geometries.iter().enumerate().filter(|(i, _)| first[*i] as usize == *i) {
             let bounds = geometry.bounds(crate::geometry::Domain::WHOLE);
             let [a, b, c] = bounds.min.to_array().map(f32::to_bits);
             let [d, e, f] = bounds.max.to_array().map(f32::to_bits);

@@ -51,7 +51,8 @@ fn floor(solution: &Solution, x: f32, y: f32) -> f32 {
 
 #[test]
 fn the_inside_of_a_box_on_the_floor_is_left_out() {
-    let solution = solve(&room(0.0, false), 0.1);
+    // Fine enough for leaves that lie below the box as a whole.
+    let solution = solve(&room(0.0, false), 0.01);
     // The inside of the box, and the outside of the room.
     assert_eq!(solution.stats.skipped.sealed_sides, 5 + 5);
     assert_eq!(floor(&solution, 0.5, 0.5), 0.0, "below the box");
@@ -78,5 +79,5 @@ fn no_light_is_lost_below_a_box() {
         (0..4).map(light).sum::<f32>()
     };
     let (whole, cut) = (walls(false), walls(true));
-    assert!((whole / cut - 1.0).abs() < 0.003, "{whole} in front of a floor in one piece, {cut} of one cut to fit");
+    assert!((whole / cut - 1.0).abs() < 0.004, "{whole} in front of a floor in one piece, {cut} of one cut to fit");
 }

@@ -1,0 +1,15 @@
+//! Whatever is handed in: the right answer or a typed error. Never a panic, a hang, NaN or negative light.
+//!
+//! `STABILITY_CASES=10000` makes the random tests run that many cases each.
+
+mod answers;
+mod cases;
+mod crowds;
+mod energy;
+mod input;
+mod placement;
+mod random;
+#[path = "../pipeline/scenes.rs"]
+#[allow(dead_code, reason = "the pipeline's tests use more of it")]
+mod scenes;
+mod stopping;
