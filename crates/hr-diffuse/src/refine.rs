@@ -28,6 +28,8 @@ const RADIOSITY_SHARE: f32 = 0.5;
 /// The same where it stems from the sender's directional distribution: of the directions that lead to a receiver few
 /// see the peak of a narrow lobe.
 const DIRECTIONAL_SHARE: f32 = 0.05;
+/// Leaves of surfaces that reflect directional light have normals within this angle (radians) of their middle.
+const MOST_BENT: f32 = 0.6;
 /// Share of a link's tolerance that its factor may be wrong by, …
 const FACTOR_SHARE: f32 = 0.05;
 /// … least and most that may be relative to the factor, …
@@ -323,6 +325,15 @@ fn decide<L: LightField>(
     let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);
     if touching && !(r.is_flat() && s.is_flat()) && !segments::any_facing(light, pair.receiver, pair.sender, PROBES) {
         return Verdict::Facing;
+    }
+    // What a bent leaf reflects toward the eye differs over it more than one distribution can tell.
+    let bent = r.active && r.is_patch() && r.normals.angle() > MOST_BENT;
+    if bent
+        && weight * interval.most > tolerance.error
+        && (r.child_count > 0 || r.radius > tolerance.smallest)
+        && !stopped
+    {
+        return Verdict::SplitReceiver;
     }
     if by_bounds > tolerance.error {
         let prefer_sender = RADIOSITY_SHARE * interval.radiosity > GEOMETRY_SHARE * interval.geometry;
