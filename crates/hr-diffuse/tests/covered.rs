@@ -79,5 +79,6 @@ fn no_light_is_lost_below_a_box() {
         (0..4).map(light).sum::<f32>()
     };
     let (whole, cut) = (walls(false), walls(true));
+    // 0.3 % less at this error; 0.65 % where leaves shine with their mean over the covered part, too.
     assert!((whole / cut - 1.0).abs() < 0.004, "{whole} in front of a floor in one piece, {cut} of one cut to fit");
 }
