@@ -162,7 +162,7 @@ impl LightField for GlossyField {
 
     fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], arrived: Arrived) -> Haar {
         let Some(material) = self.material(hierarchy.material(leaf)) else { return Haar::default() };
-        let place = Place::new(hierarchy.center(leaf), hierarchy.normals(leaf).axis);
+        let place = Place::along(hierarchy.center(leaf), hierarchy.normals(leaf).axis, material.reflector.grain());
         let mut incident = Vec::new();
         arriving(hierarchy, leaf, path, &place, &mut incident);
         if incident.is_empty() {

@@ -2,6 +2,7 @@
 //! reflectors, after Stamminger et al., "Efficient Glossy Global Illumination with Interactive Viewing", Computer
 //! Graphics Forum 19(1), 2000. It plugs into an engine through the hooks of `hr-diffuse` only.
 
+pub mod conformance;
 pub mod field;
 pub mod haar;
 pub mod reflector;
@@ -9,5 +10,7 @@ pub mod samples;
 
 pub use field::GlossyField;
 pub use hr_diffuse::Rgb;
-pub use reflector::{Incident, Lambert, Lobe, MetallicRoughness, Phong, Reflector, ReflectorError, Sample, Sum, Ward};
+pub use reflector::{
+    Compensated, Incident, Lambert, Lobe, MetallicRoughness, Phong, Reflector, ReflectorError, Sample, Sum, Ward,
+};
 pub use samples::{IlluminationSample, Place, SampleSet, arriving};

@@ -64,6 +64,16 @@ impl Place {
         Self { at, frame: Mat3::from_cols(x, y, normal) }
     }
 
+    /// A place with a unit normal whose first tangent follows a reflector's [grain](crate::Reflector::grain). Where there
+    /// is none, or it is along the normal, the tangents are any.
+    #[must_use]
+    pub fn along(at: Vec3, normal: Vec3, grain: Option<Vec3>) -> Self {
+        // A grain within about 0.06° of the normal has no direction that rounding leaves alone.
+        let across = grain.map(|g| normal.cross(g)).filter(|y| y.length_squared() > 1e-6);
+        let Some(y) = across.and_then(Vec3::try_normalize) else { return Self::new(at, normal) };
+        Self { at, frame: Mat3::from_cols(y.cross(normal), y, normal) }
+    }
+
     /// Unit normal.
     #[must_use]
     pub fn normal(&self) -> Vec3 {

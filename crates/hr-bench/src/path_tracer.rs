@@ -256,7 +256,7 @@ impl PathTracer {
         let true_normal = hit.normal * side;
         // Without shading normals the true one is right also at grazing directions.
         let flat = self.scene.surfaces[hit.surface as usize].shading_normals.is_none();
-        let place = Place::new(hit.point, if flat { true_normal } else { normal });
+        let place = Place::along(hit.point, if flat { true_normal } else { normal }, reflector.grain());
         Some(Point {
             position: hit.point,
             surface: hit.surface,

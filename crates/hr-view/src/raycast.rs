@@ -131,7 +131,7 @@ impl<'a> RayCaster<'a> {
             }
             // Of leaves whose light no link asked for there is no distribution.
             Mode::Samples if self.solution.reflected[leaf.index()].is_empty() => {
-                let place = Place::new(met.hit.point, met.normal);
+                let place = Place::along(met.hit.point, met.normal, met.reflector.grain());
                 glossy::reflected(self.solution, &*met.reflector, leaf, &place, away, NARROWEST, scratch)
             }
             Mode::Samples => self.interpolated(&met),
@@ -147,7 +147,7 @@ impl<'a> RayCaster<'a> {
 
     /// Glossy radiance from the samples that arrive at the point, or along rays where the lobe is narrow.
     fn reflected(&self, met: &Met, bounce: u32, seed: u32, scratch: &mut Vec<Incident>) -> Rgb {
-        let place = Place::new(met.hit.point, met.normal);
+        let place = Place::along(met.hit.point, met.normal, met.reflector.grain());
         let outgoing = place.local(met.away);
         let mirror = met.reflector.mirror();
         let mut light = Rgb::ZERO;

@@ -48,7 +48,7 @@ impl<'a> Walkthrough<'a> {
                 let reflector = color
                     .and_then(|color| material.reflector.with_base_color(color))
                     .unwrap_or_else(|| Arc::clone(&material.reflector));
-                let place = Place::new(at, normal);
+                let place = Place::along(at, normal, reflector.grain());
                 let leaf = NodeId(source.leaf);
                 return glossy::reflected(solution, reflector.as_ref(), leaf, &place, away, NARROWEST, scratch);
             }

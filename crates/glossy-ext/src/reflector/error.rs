@@ -1,5 +1,7 @@
 //! What is wrong with the parameters of a reflector.
 
+use super::unit;
+use glam::Vec3;
 use hr_diffuse::Rgb;
 
 /// A parameter that no surface can have.
@@ -33,6 +35,16 @@ pub enum ReflectorError {
         /// What was given.
         value: Rgb,
     },
+    /// A direction is zero or not finite. Mend: give any vector along it; its length does not matter.
+    #[error("{reflector}: {parameter} is {value}, but must be a direction: finite and not zero")]
+    Direction {
+        /// The reflector's name.
+        reflector: &'static str,
+        /// The parameter's name.
+        parameter: &'static str,
+        /// What was given.
+        value: Vec3,
+    },
 }
 
 /// `value`, if it is in the range.
@@ -56,6 +68,11 @@ pub(super) fn reflectance(reflector: &'static str, parameter: &'static str, valu
     } else {
         Err(ReflectorError::Reflectance { reflector, parameter, value })
     }
+}
+
+/// `value` as a unit vector, if it is a direction.
+pub(super) fn direction(reflector: &'static str, parameter: &'static str, value: Vec3) -> Result<Vec3, ReflectorError> {
+    unit(value).ok_or(ReflectorError::Direction { reflector, parameter, value })
 }
 
 /// A reflectance out of any colour: clamped to 0…1, NaN becomes 0.

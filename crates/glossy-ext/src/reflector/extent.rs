@@ -63,8 +63,11 @@ impl Disk {
 struct Slopes {
     incident: Vec3,
     inv_z: f32,
+    /// Slopes are multiplied by this, to make the lobe round.
+    stretch: Vec2,
+    /// Not stretched.
     slope: Vec2,
-    // J Jᵀ.
+    // J Jᵀ, stretched.
     xx: f32,
     xy: f32,
     yy: f32,
@@ -76,7 +79,7 @@ const LARGEST: f32 = 1e15;
 
 impl Slopes {
     #[inline]
-    fn new(incident: Vec3, outgoing: Vec3) -> Self {
+    fn new(incident: Vec3, outgoing: Vec3, stretch: Vec2) -> Self {
         let h = incident + outgoing;
         let inv_z = h.z.recip();
         let (x, y) = (h.x * inv_z, h.y * inv_z);
@@ -87,10 +90,11 @@ impl Slopes {
         Self {
             incident,
             inv_z,
+            stretch,
             slope: Vec2::new(x, y),
-            xx: (scale * (1.0 + x * x - p * p)).clamp(0.0, LARGEST),
-            xy: (scale * (x * y - p * q)).clamp(-LARGEST, LARGEST),
-            yy: (scale * (1.0 + y * y - q * q)).clamp(0.0, LARGEST),
+            xx: (scale * stretch.x * stretch.x * (1.0 + x * x - p * p)).clamp(0.0, LARGEST),
+            xy: (scale * stretch.x * stretch.y * (x * y - p * q)).clamp(-LARGEST, LARGEST),
+            yy: (scale * stretch.y * stretch.y * (1.0 + y * y - q * q)).clamp(0.0, LARGEST),
         }
     }
 
@@ -98,12 +102,13 @@ impl Slopes {
     #[inline]
     fn slope_of(&self, v: Vec3) -> Vec2 {
         let v = v - self.incident * self.incident.dot(v);
-        (v.truncate() - self.slope * v.z) * self.inv_z
+        (v.truncate() - self.slope * v.z) * self.stretch * self.inv_z
     }
 
     /// Jᵀ v.
     #[inline]
     fn direction_of(&self, v: Vec2) -> Vec3 {
+        let v = v * self.stretch;
         let g = v.extend(-self.slope.dot(v)) * self.inv_z;
         g - self.incident * self.incident.dot(g)
     }
@@ -130,16 +135,17 @@ pub(super) struct Meeting {
     pub weight: f32,
     radius2: f32,
     slopes: Slopes,
-    /// Slope of the disk's middle, as seen by the linear map.
+    /// Stretched slope of the disk's middle, as seen by the linear map.
     middle: Vec2,
 }
 
 impl Meeting {
-    /// `variance` is that of the lobe's slopes, per axis, as a function of the squared slope.
+    /// `stretch` is what slopes are multiplied by to make the lobe round; `variance` is that of the lobe's stretched
+    /// slopes, per axis, as a function of their square.
     #[inline]
-    pub(super) fn new(disk: &Disk, outgoing: Vec3, variance: impl Fn(f32) -> f32) -> Self {
-        let mut slopes = Slopes::new(disk.middle, outgoing);
-        let mut middle = slopes.slope;
+    pub(super) fn new(disk: &Disk, outgoing: Vec3, stretch: Vec2, variance: impl Fn(f32) -> f32) -> Self {
+        let mut slopes = Slopes::new(disk.middle, outgoing, stretch);
+        let mut middle = slopes.slope * stretch;
         let variance = variance(middle.length_squared());
         let share = 0.25 * disk.radius2;
         // Disks that are small against the lobe need no second look.
@@ -153,8 +159,8 @@ impl Meeting {
             let moved = disk.middle + step;
             let incident = moved / moved.length();
             if incident.z > HORIZON {
-                slopes = Slopes::new(incident, outgoing);
-                middle = slopes.slope + slopes.slope_of(disk.middle - incident);
+                slopes = Slopes::new(incident, outgoing, stretch);
+                middle = slopes.slope * stretch + slopes.slope_of(disk.middle - incident);
             }
         }
         Self {
@@ -168,7 +174,7 @@ impl Meeting {
         }
     }
 
-    /// For M = `lobe`·I + `share`·E: √det M, and √det M × sᵀM⁻¹s with the slope s of the disk's middle.
+    /// For M = `lobe`·I + `share`·E: √det M, and √det M × sᵀM⁻¹s with the stretched slope s of the disk's middle.
     #[inline]
     pub(super) fn rounded(&self, lobe: f32, share: f32) -> (f32, f32) {
         let (root, solved) = self.slopes.solve(lobe, share * self.radius2, self.middle);

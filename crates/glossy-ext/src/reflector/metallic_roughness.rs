@@ -2,12 +2,13 @@
 
 use super::error::{ReflectorError, clamped, number, reflectance};
 use super::extent::{Disk, Meeting, ggx_over_disk};
+use super::ggx::{density, distribution, draw, mean_albedo, schlick, visibility};
 use super::half_vector::HalfRange;
 use super::ward::slope_to_width;
-use super::{Incident, Lobe, Reflector, Sample, above, cosine_hemisphere, mirrored, unit};
+use super::{Compensated, Incident, Lobe, Reflector, Sample, above, cosine_hemisphere, mirrored};
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
-use std::f32::consts::{FRAC_1_PI, TAU};
+use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
 /// The BRDF of the glTF 2.0 specification, Appendix B ("Metal BRDF and Dielectric BRDF"): with H the normalised half
@@ -25,13 +26,15 @@ use std::sync::Arc;
 /// is part of [`glossy`](Reflector::glossy). It is a little positive around the back-scattering direction and negative at
 /// grazing forward scattering; its mean is 0.
 ///
-/// The albedo of a white dielectric exceeds 1 near grazing directions, by up to 22 % (at roughness 0.3 and 83°; less for
-/// smoother and rougher ones): the model's diffuse term does not account for the light that tilted facets turn away.
+/// The albedo of a bright dielectric exceeds 1 near grazing directions: the specification's diffuse term does not make
+/// room for what the lobe reflects there. For white it comes to 1.85 at 89° where the surface is smooth (α = 0.001), to
+/// 1.2 at 83° at roughness 0.3, to 1.02 where it is rough; the mean over directions stays below 1.01. Between facets no
+/// light is passed on, so that rough metals are too dark. [`compensated`](Self::compensated) mends both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetallicRoughness {
-    base: Rgb,
-    metallic: f32,
-    alpha: f32,
+    pub(super) base: Rgb,
+    pub(super) metallic: f32,
+    pub(super) alpha: f32,
     /// Reflectance along the normal.
     f0: Rgb,
     /// (1 − metallic) base/π.
@@ -42,7 +45,7 @@ pub struct MetallicRoughness {
 }
 
 /// Reflectance of the dielectric along the normal.
-const DIELECTRIC_F0: f32 = 0.04;
+pub(super) const DIELECTRIC_F0: f32 = 0.04;
 
 /// w = (1 − V·H)⁵ averaged over incident and outgoing directions, both weighted by their cosine.
 const MEAN_W: f32 = 0.003_684_55;
@@ -68,7 +71,18 @@ impl MetallicRoughness {
         Ok(Self { base, metallic, alpha, f0: Rgb::ZERO, matte: Rgb::ZERO, albedo, albedo_w }.with_base(base))
     }
 
-    fn with_base(self, base: Rgb) -> Self {
+    /// The same with compensation for what its lobe loses between facets and for what its diffuse term gains.
+    #[must_use]
+    pub fn compensated(self) -> Compensated {
+        Compensated::new(self)
+    }
+
+    /// The lobe alone.
+    pub(super) fn without_diffuse(self) -> Self {
+        Self { matte: Rgb::ZERO, ..self }
+    }
+
+    pub(super) fn with_base(self, base: Rgb) -> Self {
         Self {
             base,
             f0: Rgb::splat(DIELECTRIC_F0 * (1.0 - self.metallic)) + base * self.metallic,
@@ -86,7 +100,7 @@ impl MetallicRoughness {
         }
         let alpha2 = self.alpha * self.alpha;
         // A Gaussian with the relative slope of the density at hand.
-        let meeting = Meeting::new(disk, outgoing, |tan2| 0.25 * (alpha2 + tan2));
+        let meeting = Meeting::new(disk, outgoing, Vec2::ONE, |tan2| 0.25 * (alpha2 + tan2));
         let (root, _) = meeting.rounded(alpha2, 1.0);
         // Far out the density changes slowly, and the ellipse's shape matters less.
         let (_, squared) = meeting.rounded(alpha2 + meeting.tan2, 1.0);
@@ -115,80 +129,6 @@ impl MetallicRoughness {
     fn remainder(&self, w: f32) -> Rgb {
         self.matte * ((1.0 - DIELECTRIC_F0) * (MEAN_W - w))
     }
-}
-
-/// (1 − V·H)⁵ from h = V + L, not normalised: V·H is half its length.
-#[inline]
-fn schlick(h: Vec3) -> f32 {
-    let m = (1.0 - 0.5 * h.length()).max(0.0);
-    let m2 = m * m;
-    m2 * m2 * m
-}
-
-/// D; the sine from x and y keeps small α exact.
-#[inline]
-fn distribution(alpha: f32, h: Vec3) -> f32 {
-    let alpha2 = alpha * alpha;
-    let ratio = h.length_squared() / (h.x * h.x + h.y * h.y + alpha2 * h.z * h.z);
-    alpha2 * FRAC_1_PI * ratio * ratio
-}
-
-/// √(α² + (1 − α²) cos²).
-#[inline]
-fn root(alpha: f32, cos: f32) -> f32 {
-    let alpha2 = alpha * alpha;
-    (alpha2 + (1.0 - alpha2) * cos * cos).max(0.0).sqrt()
-}
-
-/// G / (4 (V·N) (L·N)).
-#[inline]
-fn visibility(alpha: f32, cos_i: f32, cos_o: f32) -> f32 {
-    0.5 / (cos_o * root(alpha, cos_i) + cos_i * root(alpha, cos_o))
-}
-
-/// A facet out of those visible from `outgoing` (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps",
-/// Computer Graphics Forum 42(8), 2023), and the direction it mirrors `outgoing` to.
-fn draw(alpha: f32, outgoing: Vec3, u: Vec2) -> Option<Vec3> {
-    let stretched = unit(Vec3::new(alpha * outgoing.x, alpha * outgoing.y, outgoing.z))?;
-    let z = (1.0 - u.y.clamp(0.0, 1.0)) * (1.0 + stretched.z) - stretched.z;
-    let radius = (1.0 - z * z).max(0.0).sqrt();
-    let (s, c) = (TAU * u.x).sin_cos();
-    let h = Vec3::new(radius * c, radius * s, z) + stretched;
-    let h = unit(Vec3::new(alpha * h.x, alpha * h.y, h.z.max(0.0)))?;
-    let incident = unit(2.0 * outgoing.dot(h) * h - outgoing)?;
-    above(incident).then_some(incident)
-}
-
-/// Density of [`draw`] per solid angle of incident directions.
-fn density(alpha: f32, incident: Vec3, outgoing: Vec3) -> f32 {
-    distribution(alpha, incident + outgoing) / (2.0 * (outgoing.z + root(alpha, outgoing.z)))
-}
-
-/// Mean over outgoing directions of the lobe's albedo, without Fresnel factor and with the factor w.
-fn mean_albedo(alpha: f32) -> (f32, f32) {
-    const OUT: usize = 12;
-    const CAPS: usize = 12;
-    const TURNS: usize = 12;
-    let (mut sum, mut sum_w) = (0.0_f64, 0.0_f64);
-    for j in 0..OUT {
-        let cos2 = (j as f32 + 0.5) / OUT as f32;
-        let outgoing = Vec3::new((1.0 - cos2).sqrt(), 0.0, cos2.sqrt());
-        for k in 0..CAPS {
-            for l in 0..TURNS {
-                let u = Vec2::new(0.5 * (l as f32 + 0.5) / TURNS as f32, (k as f32 + 0.5) / CAPS as f32);
-                if let Some(incident) = draw(alpha, outgoing, u) {
-                    let weight = 2.0
-                        * (outgoing.z + root(alpha, outgoing.z))
-                        * visibility(alpha, incident.z, outgoing.z)
-                        * incident.z;
-                    sum += f64::from(weight);
-                    sum_w += f64::from(weight * schlick(incident + outgoing));
-                }
-            }
-        }
-    }
-    let count = (OUT * CAPS * TURNS) as f64;
-    ((sum / count) as f32, (sum_w / count) as f32)
 }
 
 impl Reflector for MetallicRoughness {
@@ -242,7 +182,7 @@ impl Reflector for MetallicRoughness {
     }
 
     fn glossy_bound(&self, incident: &Cone, outgoing: Vec3) -> f32 {
-        let Some(range) = HalfRange::new(incident, outgoing) else {
+        let Some(range) = HalfRange::new(incident, outgoing, Vec2::ONE) else {
             return 0.0;
         };
         let alpha2 = self.alpha * self.alpha;

@@ -1,8 +1,9 @@
 //! What a material does with light: the interface that a custom BRDF implements, and the built-in BRDFs.
 //!
 //! Directions are unit vectors in the surface's own frame: z along the normal, both pointing away from the
-//! surface, both with z > 0 (engines turn the frame over for the back of a two-sided surface). A direction with
-//! z ≤ [`HORIZON`] is below the horizon: nothing comes from there and nothing goes there.
+//! surface, both with z > 0 (engines turn the frame over for the back of a two-sided surface); x along the
+//! [grain](Reflector::grain) of a BRDF that has one, else any tangent. A direction with z ≤ [`HORIZON`] is below the
+//! horizon: nothing comes from there and nothing goes there.
 //!
 //! | reflector | glossy part |
 //! | --- | --- |
@@ -10,6 +11,7 @@
 //! | [`Phong`] | cosⁿ about the mirror direction, energy-normalised |
 //! | [`Ward`] | Gaussian of half-vector slopes, bounded albedo |
 //! | [`MetallicRoughness`] | GGX of glTF 2.0, and what its diffuse term has more or less than a Lambertian |
+//! | [`Compensated`] | the same, with the light that facets pass on and a diffuse term that gets what is left |
 //! | [`Sum`] | that of its parts |
 //!
 //! Constructors check parameters one by one. They do not check that diffuse and glossy reflectance together stay
@@ -17,9 +19,11 @@
 //! directions for a white dielectric. [`Reflector::diffuse`] + [`Reflector::glossy_albedo`] + [`Reflector::mirror`]
 //! tells an engine whether its iteration converges.
 
+mod compensated;
 mod error;
 mod extent;
 mod generic;
+mod ggx;
 mod half_vector;
 mod lambert;
 mod metallic_roughness;
@@ -29,6 +33,7 @@ mod sum;
 mod tests;
 mod ward;
 
+pub use compensated::Compensated;
 pub use error::ReflectorError;
 pub use lambert::Lambert;
 pub use metallic_roughness::MetallicRoughness;
@@ -172,6 +177,13 @@ pub trait Reflector: Debug + Send + Sync {
         let incident = cosine_hemisphere(u);
         (above(outgoing) && above(incident))
             .then(|| Sample { incident, weight: self.glossy(incident, outgoing) * std::f32::consts::PI })
+    }
+
+    /// Direction of the scene that the frame's x axis follows, as far as the surface allows: it is projected onto the
+    /// plane of the surface, so that on a turned part the direction of the lathe's axis gives the lines along it. `None`
+    /// for a BRDF that is isotropic about the normal; x is any tangent then.
+    fn grain(&self) -> Option<Vec3> {
+        None
     }
 
     /// Reflectance of a perfect mirror that is part of this BRDF (a delta lobe), else 0.

@@ -106,6 +106,11 @@ impl Reflector for Sum {
         Some(Sample { weight: sample.weight / share, ..sample })
     }
 
+    /// That of the first part that has one: a surface has one frame.
+    fn grain(&self) -> Option<Vec3> {
+        self.parts.iter().find_map(|part| part.grain())
+    }
+
     fn mirror(&self) -> Rgb {
         self.add(|part| part.mirror())
     }
