@@ -11,6 +11,7 @@ pub mod samples;
 pub use field::GlossyField;
 pub use hr_diffuse::Rgb;
 pub use reflector::{
-    Compensated, Incident, Lambert, Lobe, MetallicRoughness, Phong, Reflector, ReflectorError, Sample, Sum, Ward,
+    Compensated, Incident, Lambert, Lobe, MerlError, MetallicRoughness, Phong, Reflector, ReflectorError, Sample, Sum,
+    Tabulated, Ward,
 };
 pub use samples::{IlluminationSample, Place, SampleSet, arriving};

@@ -188,3 +188,31 @@ fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Plac
         irradiance: sample.irradiance() * scale,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_follow_the_grain() {
+        let lathe = Some(2.0 * Vec3::Z);
+        for k in 0..50 {
+            let turn = 0.37 * k as f32;
+            let normal = Vec3::new(turn.cos(), turn.sin(), (0.2 * k as f32).sin()).normalize();
+            let frame = Place::along(Vec3::ZERO, normal, lathe).frame;
+            let off = (frame.transpose() * frame - Mat3::IDENTITY).to_cols_array().map(f32::abs);
+            assert!(off.iter().all(|&e| e < 1e-5) && frame.determinant() > 0.0, "right-handed frame: {frame}");
+            assert_eq!(frame.z_axis, normal, "the normal");
+            let projected = (Vec3::Z - normal * normal.z).normalize();
+            assert!(frame.x_axis.distance(projected) < 1e-4, "{} is not {projected}", frame.x_axis);
+        }
+        for grain in [None, lathe] {
+            let any = Place::along(Vec3::ZERO, Vec3::Z, grain);
+            assert_eq!(
+                any.frame,
+                Place::new(Vec3::ZERO, Vec3::Z).frame,
+                "any tangents where there is no grain to follow"
+            );
+        }
+    }
+}

@@ -12,6 +12,7 @@
 //! | [`Ward`] | Gaussian of half-vector slopes, bounded albedo |
 //! | [`MetallicRoughness`] | GGX of glTF 2.0, and what its diffuse term has more or less than a Lambertian |
 //! | [`Compensated`] | the same, with the light that facets pass on and a diffuse term that gets what is left |
+//! | [`Tabulated`] | measured, isotropic: files of the MERL database |
 //! | [`Sum`] | that of its parts |
 //!
 //! Constructors check parameters one by one. They do not check that diffuse and glossy reflectance together stay
@@ -26,9 +27,11 @@ mod generic;
 mod ggx;
 mod half_vector;
 mod lambert;
+mod merl;
 mod metallic_roughness;
 mod phong;
 mod sum;
+mod tabulated;
 #[cfg(test)]
 mod tests;
 mod ward;
@@ -36,9 +39,11 @@ mod ward;
 pub use compensated::Compensated;
 pub use error::ReflectorError;
 pub use lambert::Lambert;
+pub use merl::MerlError;
 pub use metallic_roughness::MetallicRoughness;
 pub use phong::Phong;
 pub use sum::Sum;
+pub use tabulated::{Mended, Tabulated};
 pub use ward::Ward;
 
 use glam::{Vec2, Vec3};
