@@ -249,6 +249,9 @@ impl Haar {
 
     /// Visits the linear pieces under all triangles that `enter` lets pass, with values in units of the scale.
     fn pieces(&self, enter: &mut impl FnMut(&Visit) -> bool, piece: &mut impl FnMut(&Triangle, [Rgb; 3])) {
+        if self.vertices.is_empty() {
+            return;
+        }
         for face in 0..8 {
             let triangle = Triangle::new(face_corners(face));
             let vertices = Self::face_vertices(face);
