@@ -9,6 +9,7 @@ mod energy;
 mod input;
 mod placement;
 mod random;
+mod reflectors;
 #[path = "../pipeline/scenes.rs"]
 #[allow(dead_code, reason = "the pipeline's tests use more of it")]
 mod scenes;

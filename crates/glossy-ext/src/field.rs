@@ -24,6 +24,16 @@ const MOST_BALANCE: f32 = 4.0;
 /// Of a leaf's samples, the directions of so many strongest ones are told to the projection as peaks.
 const PEAKS: usize = 12;
 
+/// Reflectances and shares of radiances that are clamped by less are approximations, and not counted.
+const CLAMPED: f32 = 0.01;
+
+/// An albedo that a surface can have beside a diffuse reflectance: what is no number is 0.
+fn possible(albedo: Rgb, diffuse: Rgb) -> Rgb {
+    let channel = |albedo: f32, diffuse: f32| albedo.min(1.0 - diffuse).max(0.0);
+    let known = Rgb::select(albedo.is_nan_mask(), Rgb::ZERO, albedo);
+    Rgb::new(channel(known.x, diffuse.x), channel(known.y, diffuse.y), channel(known.z, diffuse.z))
+}
+
 /// How one material's light is transported.
 #[derive(Clone, Debug)]
 struct Material {
@@ -39,6 +49,7 @@ struct Material {
 pub struct Counters {
     evaluations: AtomicU64,
     samples: AtomicU64,
+    clamped: AtomicU64,
 }
 
 impl Counters {
@@ -53,9 +64,21 @@ impl Counters {
     pub fn samples_reflected(&self) -> u64 {
         self.samples.load(Ordering::Relaxed)
     }
+
+    /// How often a reflector did what none can, and was overruled: radiances that were not finite, which became 0, or
+    /// negative together with the diffuse part, which became 0 together with it; and albedos that were no number, negative
+    /// or above 1 (by more than a hundredth) together with the diffuse part, which were clamped. 0 with reflectors that
+    /// pass [`conformance::check`](crate::conformance::check).
+    #[must_use]
+    pub fn clamped(&self) -> u64 {
+        self.clamped.load(Ordering::Relaxed)
+    }
 }
 
 /// Glossy reflection for an engine: implements its hooks.
+///
+/// Reflectors are not trusted: what no surface can do is clamped and [counted](Counters::clamped), so that a wrong one
+/// shows in its own place and never spoils the solution.
 #[derive(Debug)]
 pub struct GlossyField {
     /// `None`: the material is diffuse.
@@ -68,20 +91,26 @@ impl GlossyField {
     /// For the materials of a scene, by index. Those whose reflector is diffuse take no part.
     #[must_use]
     pub fn new(reflectors: &[Arc<dyn Reflector>], refinement: Refinement) -> Self {
+        let counters = Counters::default();
         let materials = reflectors.iter().map(|reflector| {
             (!reflector.is_diffuse()).then(|| {
                 let mirror = reflector.mirror();
+                let stated = reflector.glossy_albedo() + mirror;
+                let albedo = possible(stated, reflector.diffuse());
+                if (stated - albedo).abs().cmpgt(Rgb::splat(CLAMPED)).any() || !stated.is_finite() {
+                    counters.clamped.fetch_add(1, Ordering::Relaxed);
+                }
                 Material {
                     reflector: Arc::clone(reflector),
                     mirror: (mirror.max_element() > 0.0)
                         .then(|| Ward::new(Rgb::ZERO, mirror, MIRROR_ALPHA).ok())
                         .flatten(),
-                    albedo: (reflector.glossy_albedo() + mirror).max(Rgb::ZERO),
+                    albedo,
                 }
             })
         });
-
-        Self { materials: materials.collect(), refinement, counters: Counters::default() }
+        let materials = materials.collect();
+        Self { materials, refinement, counters }
     }
 
     /// Work done so far.
@@ -123,10 +152,11 @@ fn peaks(material: &Material, incident: &[Incident], place: &Place) -> Vec<Peak>
         .map(|sample| {
             // By reciprocity the lobe of the incident direction is where it is reflected to.
             let lobe = material.reflector.lobe(sample.direction);
+            let mirrored = Vec3::new(-sample.direction.x, -sample.direction.y, sample.direction.z);
             let (direction, width) = if material.mirror.is_some() {
-                (Vec3::new(-sample.direction.x, -sample.direction.y, sample.direction.z), MIRROR_ALPHA)
+                (mirrored, MIRROR_ALPHA)
             } else {
-                (lobe.direction, lobe.width)
+                (lobe.direction.try_normalize().unwrap_or(mirrored), lobe.width)
             };
             Peak { direction: place.frame * direction, width: width.max(NARROWEST).max(sample.extent) }
         })
@@ -189,15 +219,22 @@ impl LightField for GlossyField {
             offset: arrived.diffuse,
             peaks: &peaks(material, &incident, &place),
         };
+        // A glossy part may be negative where the diffuse one overestimates; both together are not.
+        let least = -arrived.diffuse;
+        let mut negative = 0;
         let projected = Haar::project(&self.refinement, &known, |direction| {
             let outgoing = place.local(direction);
-            let radiance = material.reflect(&incident, outgoing);
+            let reflected = material.reflect(&incident, outgoing);
+            // What is not finite the projection itself replaces and counts.
+            let radiance = if reflected.is_finite() { reflected.max(least) } else { reflected };
+            negative += u64::from((radiance - reflected).cmpgt(CLAMPED * radiance.abs()).any());
             // On elements that are not flat, intensity per area.
             if flat { radiance } else { radiance * outgoing.z.max(0.0) }
         });
         let evaluations = projected.evaluations as u64 * incident.len() as u64;
         self.counters.evaluations.fetch_add(evaluations, Ordering::Relaxed);
         self.counters.samples.fetch_add(incident.len() as u64, Ordering::Relaxed);
+        self.counters.clamped.fetch_add(negative + projected.not_finite as u64, Ordering::Relaxed);
         let mut haar = projected.haar;
         // A projection that overestimates a narrow lobe would let mirrors facing each other shine without end.
         let power = if flat { haar.cosine_integral(place.normal()) } else { haar.integral() }.element_sum();

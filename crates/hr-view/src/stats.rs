@@ -50,6 +50,7 @@ pub fn stats(solved: &Solved, asked: f32, error: f32, times: &Times) -> Value {
             "samples": samples,
             "basis_functions": basis_functions,
             "brdf_evaluations": solution.field.counters().brdf_evaluations(),
+            "brdf_clamped": solution.field.counters().clamped(),
         },
         "skipped": {
             "black_receivers": skipped.black_receivers,
