@@ -1,10 +1,11 @@
 //! A material of one's own: paint with glass beads in it, as on road signs, that throws light back to where it comes
-//! from.
+//! from. The conformance kit looks it over before its picture is taken.
 //!
 //! `cargo run --release --example custom_reflector` writes `custom_reflector.png` into the current folder.
 
 use glam::{DVec3, Vec3};
-use glossy_ext::{Lambert, Reflector, Rgb};
+use glossy_ext::reflector::HORIZON;
+use glossy_ext::{Lambert, Reflector, Rgb, conformance};
 use hr_diffuse::{Settings, Shape, Surface};
 use hr_scene::{Camera, Material, Primaries, Scene, ToneMap};
 use hr_view::Mode;
@@ -30,6 +31,9 @@ struct Retroreflector {
 impl Reflector for Retroreflector {
     // Reciprocal, as the cosine between the two directions is.
     fn eval(&self, incident: Vec3, outgoing: Vec3) -> Rgb {
+        if incident.z <= HORIZON || outgoing.z <= HORIZON {
+            return Rgb::ZERO;
+        }
         let lobe = incident.dot(outgoing).max(0.0).powf(self.exponent);
         self.ground * FRAC_1_PI + self.beads * ((self.exponent + 2.0) / (2.0 * PI) * lobe)
     }
@@ -52,9 +56,12 @@ fn material(name: &str, reflector: impl Reflector + 'static, exitance: Rgb) -> M
     }
 }
 
+#[expect(clippy::print_stdout, reason = "an example tells what it found out")]
 /// A lamp beside the camera shines on three balls: plaster, retroreflector, plaster.
 fn scene() -> Result<Scene, Box<dyn Error>> {
-    let beads = Retroreflector { ground: Rgb::new(0.3, 0.08, 0.02), beads: Rgb::new(0.1, 0.07, 0.02), exponent: 40.0 };
+    let beads = Retroreflector { ground: Rgb::new(0.3, 0.08, 0.02), beads: Rgb::new(0.1, 0.07, 0.02), exponent: 20.0 };
+    let measured = conformance::check(&beads)?;
+    println!("The beads reflect at most {:.1} % of the light.", 100.0 * measured.largest_albedo);
     let quad = |corner: DVec3, a: DVec3, b: DVec3, material| {
         Surface::new(Shape::Quad([corner, corner + a, corner + a + b, corner + b]), material)
     };
@@ -93,7 +100,7 @@ fn scene() -> Result<Scene, Box<dyn Error>> {
 fn main() -> Result<(), Box<dyn Error>> {
     let scene = Arc::new(scene()?);
     let solved = Solved::new(Arc::clone(&scene), Settings { error: 0.1 }, true, &mut |_| ControlFlow::Continue(()))?;
-    let image = RayCaster::new(&scene, &solved.solution, Mode::Distributions).render(&scene.cameras[0].1, &|_| ());
+    let image = RayCaster::new(&scene, &solved.solution, Mode::Samples).render(&scene.cameras[0].1, &|_| ());
     let path = Path::new("custom_reflector.png");
     image.save(path, &ToneMap::default(), scene.primaries)?;
     println!("{}", std::path::absolute(path)?.display());

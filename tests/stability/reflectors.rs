@@ -107,7 +107,7 @@ fn misbehaving_reflectors_are_clamped_and_counted() {
 /// Appendix B of the glTF specification reflects up to 1.85 times the light that grazes a smooth white dielectric.
 #[test]
 fn white_dielectrics_do_not_make_light() {
-    for roughness in [0.0, 0.3, 0.6] {
+    for roughness in [0.0, 0.3] {
         let white = MetallicRoughness::new(Rgb::ONE, 0.0, roughness).expect("valid parameters");
         for reflector in [Arc::new(white) as Arc<dyn Reflector>, Arc::new(white.compensated())] {
             let what = format!("{reflector:?}");

@@ -62,7 +62,7 @@ pub fn interpolated(solution: &Solution<GlossyField>, corners: &[(u32, f32)], no
 
 /// Radiance that a reflector makes of the illumination samples that arrive at a place of a leaf (paper, section 3.4),
 /// in the unit direction `away`. Senders count as at least so wide (radians): too narrow a lobe would show them one
-/// by one. `scratch` saves an allocation.
+/// by one. Light that is not finite, of a reflector that misbehaves, is 0. `scratch` saves an allocation.
 #[must_use]
 pub fn reflected(
     solution: &Solution<GlossyField>,
@@ -77,5 +77,6 @@ pub fn reflected(
     for sample in scratch.iter_mut() {
         sample.extent = sample.extent.max(narrowest);
     }
-    reflector.reflect_sum(scratch, place.local(away))
+    let light = reflector.reflect_sum(scratch, place.local(away));
+    if light.is_finite() { light } else { Rgb::ZERO }
 }

@@ -163,7 +163,7 @@ impl<'a> RayCaster<'a> {
             for i in 0..LOBE_RAYS {
                 let u = point2(hash(seed, 13), i);
                 let u = Vec2::new((u.x + turn).fract(), (u.y + i as f32) / LOBE_RAYS as f32).fract();
-                if let Some(sample) = met.reflector.sample(outgoing, u) {
+                if let Some(sample) = met.reflector.sample(outgoing, u).filter(|s| s.weight.is_finite()) {
                     let direction = place.frame * sample.incident;
                     let seen = self.along(met, direction, bounce, hash(seed, 14 + i), scratch);
                     light += sample.weight * seen / LOBE_RAYS as f32;

@@ -16,9 +16,10 @@
 //! | [`Sum`] | that of its parts |
 //!
 //! Constructors check parameters one by one. They do not check that diffuse and glossy reflectance together stay
-//! below 1, and nothing is clamped: a file may ask for that, and the glTF model itself exceeds 1 slightly near grazing
-//! directions for a white dielectric. [`Reflector::diffuse`] + [`Reflector::glossy_albedo`] + [`Reflector::mirror`]
-//! tells an engine whether its iteration converges.
+//! below 1: a file may ask for that, and the glTF model itself exceeds 1 near grazing directions for a white dielectric.
+//! [`Reflector::diffuse`] + [`Reflector::glossy_albedo`] + [`Reflector::mirror`] tells an engine whether its iteration
+//! converges. [`conformance::check`](crate::conformance::check) tells whether a reflector does all that is asked here;
+//! [`GlossyField`](crate::GlossyField) clamps and counts what does not.
 
 mod compensated;
 mod error;

@@ -95,28 +95,42 @@ impl Ward {
         (-stretched / (self.alpha * self.alpha)).exp() * (1.0 + tan2) * inv
     }
 
-    /// The lobe averaged over a disk, without [`scale`](Self::scale); `outgoing` is above the horizon.
+    /// The lobe averaged over a disk, without [`scale`](Self::scale); `outgoing` is above the horizon. Where the
+    /// lobe is known to be `ROUND`, not stretching it costs nothing.
     #[inline]
-    fn lobe_over_disk(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> f32 {
+    fn lobe_over_disk<const ROUND: bool>(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> f32 {
+        let stretch = if ROUND { Vec2::ONE } else { self.stretch };
         let alpha2 = self.alpha * self.alpha;
         // No direction of the disk makes a half vector with a smaller slope than this.
         let h = incident + outgoing;
-        let nearest = extent * self.stretch.max_element() + CUT * self.alpha * (h.z + extent);
-        if (h.truncate() * self.stretch).length_squared() > nearest * nearest {
+        let nearest = extent * stretch.max_element() + CUT * self.alpha * (h.z + extent);
+        if (h.truncate() * stretch).length_squared() > nearest * nearest {
             return 0.0;
         }
         let Some(disk) = Disk::new(incident, extent) else { return 0.0 };
         if disk.radius2 == 0.0 {
             return self.lobe_toward(incident, outgoing);
         }
-        let meeting = Meeting::new(&disk, outgoing, self.stretch, |_| 0.5 * alpha2);
+        let meeting = Meeting::new(&disk, outgoing, stretch, |_| 0.5 * alpha2);
         // A disk of radius r has the variance r²/4 per axis, the lobe α²/2; where one is slender against the other,
         // twice the share comes closer to the mean over a strip.
-        let share = if self.grain.is_some() { 1.0 } else { 0.5 };
+        let share = if ROUND { 0.5 } else { 1.0 };
         let (root, squared) = meeting.rounded(alpha2, share);
         let radius2 = (root - alpha2).max(0.0) / share;
         let factor = meeting.weight * (1.0 + meeting.tan2) / (meeting.h.z * meeting.h.z);
         factor * gaussian_over_disk(squared / alpha2, radius2 / alpha2)
+    }
+
+    /// [`Reflector::reflect_sum`] without [`scale`](Self::scale).
+    fn sum<const ROUND: bool>(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        for sample in incident {
+            let lobe = self.lobe_over_disk::<ROUND>(sample.direction, outgoing, sample.extent);
+            if lobe > 0.0 {
+                sum += sample.irradiance * lobe;
+            }
+        }
+        sum
     }
 }
 
@@ -181,24 +195,15 @@ impl Reflector for Ward {
     }
 
     fn glossy_toward_extent(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> Rgb {
-        if self.has_lobe() && above(outgoing) {
-            self.scale() * self.lobe_over_disk(incident, outgoing, extent)
-        } else {
-            Rgb::ZERO
-        }
+        self.reflect_sum(&[Incident { direction: incident, extent, irradiance: Rgb::ONE }], outgoing)
     }
 
     fn reflect_sum(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
         if !(self.has_lobe() && above(outgoing)) {
             return Rgb::ZERO;
         }
-        let mut sum = Rgb::ZERO;
-        for sample in incident {
-            let lobe = self.lobe_over_disk(sample.direction, outgoing, sample.extent);
-            if lobe > 0.0 {
-                sum += sample.irradiance * lobe;
-            }
-        }
+        let is_round = self.grain.is_none();
+        let sum = if is_round { self.sum::<true>(incident, outgoing) } else { self.sum::<false>(incident, outgoing) };
         self.scale() * sum
     }
 
