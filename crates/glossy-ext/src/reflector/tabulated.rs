@@ -15,7 +15,7 @@ use std::sync::Arc;
 ///
 /// Measurements are imperfect, and what cannot be used is mended ([`mended`](Self::mended) counts):
 ///
-/// - An entry that is negative or no number is replaced, in all channels, by the nearest one at the same half vector
+/// - An entry that is negative, no number or beyond all bounds (10¹²/sr) is replaced, in all channels, by the nearest one at the same half vector
 ///   and less grazing directions; where there is none by that of a steeper half vector, or else 0.
 /// - Where more would be reflected than arrives, which happens near grazing directions, values are divided by the larger
 ///   of both directions' albedos, channel by channel: reciprocal, and nobody's albedo exceeds 1.
@@ -30,7 +30,7 @@ pub struct Tabulated {
 /// What was mended of a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mended {
-    /// Entries for directions above the horizon that were negative, infinite or no number.
+    /// Entries for directions above the horizon that were negative, no number or beyond all bounds.
     pub entries: usize,
     /// Largest directional albedo of the table as it was, 0…; 1 at most if nothing was limited.
     pub largest_albedo: f32,
@@ -65,6 +65,8 @@ struct Toward {
     width: f32,
 }
 
+/// Larger values (1/sr) are not measured ones: no lobe is narrower than a millionth of a radian.
+const LARGEST: f32 = 1e12;
 /// Every 1.4°.
 const ANGLES: usize = 65;
 /// Share of the pairs of directions that reflect less than the Lambertian share.
@@ -151,7 +153,7 @@ impl Table {
     /// Replaces what is no value.
     fn mend(&mut self) {
         let [halves, differences, azimuths] = self.size;
-        let usable = |v: &Rgb| v.is_finite() && v.min_element() >= 0.0;
+        let usable = |v: &Rgb| v.cmpge(Rgb::ZERO).all() && v.cmple(Rgb::splat(LARGEST)).all();
         for half in 0..halves {
             let (sin_h, cos_h) = (FRAC_PI_2 * ((half as f32 + 0.5) / halves as f32).powi(2)).sin_cos();
             for difference in 0..differences {
@@ -462,6 +464,30 @@ mod tests {
         }
         let nothing = Tabulated::from_merl(&merl(SIZE, |_, _| Rgb::splat(f32::NAN))).expect("a table");
         assert!(nothing.is_diffuse() && nothing.diffuse() == Rgb::ZERO, "black if nothing is known: {nothing:?}");
+    }
+
+    #[test]
+    fn any_bits_make_a_reflector() {
+        let mut bytes = merl([8, 5, 6], |_, _| Rgb::ZERO);
+        let mut state = 1_u64;
+        for byte in &mut bytes[12..] {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            *byte = (state >> 56) as u8;
+        }
+        // Some are the largest that pass.
+        for entry in 0..40 {
+            bytes[12 + 8 * entry..][..8].copy_from_slice(&1e15_f64.to_le_bytes());
+        }
+        let table = Tabulated::from_merl(&bytes).expect("a table");
+        assert!(table.mended().entries > 10 && table.mended().largest_albedo.is_finite(), "{table:?}");
+        for k in 0..2000 {
+            let v = |a: f32| direction(1.57 * (a * k as f32).fract());
+            let (i, o) = (v(0.618_034), v(0.754_877_7) * Vec3::new(-1.0, 1.0, 1.0));
+            let value = table.eval(i, o);
+            assert!(value.is_finite() && value.min_element() >= 0.0, "{value} at {i}, {o}");
+            let bound = table.glossy_bound(&Cone { axis: i, cos_angle: 0.99 }, o);
+            assert!(bound >= table.glossy(i, o).abs().max_element(), "{bound} at {i}, {o}");
+        }
     }
 
     #[test]
