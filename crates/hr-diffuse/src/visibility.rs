@@ -313,6 +313,44 @@ impl Visibility {
         Some(Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 })
     }
 
+    /// Whether any surface rises above the plane through a point with this unit normal, by more than what an end of a
+    /// segment may touch. Where a curved surface comes near it, its box decides.
+    pub(crate) fn any_above(&self, point: Vec3, normal: Vec3) -> bool {
+        let n = [0, 1, 2].map(|i| Vec4::splat(normal[i]));
+        let plane = Vec4::splat(normal.dot(point) + END_TRIM);
+        let high = [0, 1, 2].map(|i| 2 * i + usize::from(normal[i] > 0.0));
+        let mut stack: SmallVec<[u32; 64]> = SmallVec::new();
+        if !self.nodes.is_empty() {
+            stack.push(0);
+        }
+        while let Some(index) = stack.pop() {
+            if index & LEAF == 0 {
+                let Node { bounds, children } = &self.nodes[index as usize];
+                let reach =
+                    |bound: [usize; 3]| n[0] * bounds[bound[0]] + n[1] * bounds[bound[1]] + n[2] * bounds[bound[2]];
+                let exists = bounds[0].cmple(bounds[1]).bitmask();
+                if reach(high.map(|i| i ^ 1)).cmpgt(plane).bitmask() & exists != 0 {
+                    return true;
+                }
+                let mut mask = reach(high).cmpgt(plane).bitmask() & exists;
+                while mask != 0 {
+                    stack.push(children[mask.trailing_zeros() as usize & 3]);
+                    mask &= mask - 1;
+                }
+                continue;
+            }
+            let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
+            let rises = |primitive: &Primitive| match primitive {
+                Primitive::Polygon(outline) => outline.heights(normal).max_element() > plane.x,
+                Primitive::Curved => true,
+            };
+            if self.primitives[first as usize..(first + count) as usize].iter().any(rises) {
+                return true;
+            }
+        }
+        false
+    }
+
     /// Turns the binary tree into nodes of four children, parents before children.
     fn collapse(&mut self, bvh: &Bvh2, groups: &Groups) {
         // Nodes still to be filled, with the binary node that each stands for.
