@@ -8,11 +8,12 @@
 //! Most sides are known to be lit after a ray or two. Of the others a group shares its rays, however many spots it has:
 //! any one of them that finds light finds it for all. Sides that have the whole scene behind them need none.
 
-use crate::Rgb;
-use crate::geometry::{Domain, Geometry};
+use crate::geometry::{Aabb, Domain, Geometry};
 use crate::hierarchy::SceneData;
 use crate::sampling::{hash, point2, point4};
 use crate::segments::light_segment;
+use crate::visibility::{Hit, NO_BLOCKER, Region};
+use crate::{Light, Rgb};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use smallvec::SmallVec;
@@ -36,6 +37,9 @@ const MOST_SPOTS: usize = 64;
 /// How far above a surface lines between its spots run, in unit space.
 const ABOVE: f32 = 1e-3;
 
+/// What rises no more than this above a surface's plane sends it no light worth mentioning.
+const FLUSH: f32 = 1e-5;
+
 /// A point is joined to so many of the spots around it.
 const NEAREST: usize = 6;
 
@@ -44,6 +48,15 @@ const NONE: u32 = u32::MAX;
 
 /// A side of a surface: twice the surface's index, plus 1 for the back.
 pub(crate) type Side = u32;
+
+pub(crate) fn is_back(side: Side) -> bool {
+    !side.is_multiple_of(2)
+}
+
+/// The side that a ray hit.
+pub(crate) fn side_of(hit: &Hit) -> Side {
+    2 * hit.surface + u32::from(!hit.front)
+}
 
 /// For each surface, whether its front and its back may be lit. Where nothing is, everything counts as if it were: there
 /// is no light in the scene. `idle` surfaces hide light, and do nothing else with it.
@@ -76,7 +89,7 @@ pub(crate) fn lit_sides(scene: &SceneData, idle: &[bool]) -> Vec<[bool; 2]> {
 /// Whether a side does anything with light that falls on it.
 fn reflects(scene: &SceneData, idle: &[bool], side: Side) -> bool {
     let material = &scene.materials[scene.surface_materials[(side / 2) as usize] as usize];
-    !idle[(side / 2) as usize] && (side.is_multiple_of(2) || material.two_sided)
+    !idle[(side / 2) as usize] && (!is_back(side) || material.two_sided)
 }
 
 /// Whether a side has the whole scene behind it, with all lights.
@@ -85,15 +98,19 @@ fn faces_nothing(scene: &SceneData, side: Side) -> bool {
     if !geometry.is_polygon() {
         return false;
     }
-    let (x, n) = (geometry.point(Vec2::ZERO), outward(geometry, side));
-    let unlit = (0..scene.lights.len()).all(|light| light_segment(scene, light, x, n).1 <= 0.0);
-    unlit && !scene.visibility.any_above(x, n)
+    let (x, normal) = (geometry.point(Vec2::ZERO), outward(geometry, side));
+    let above = x.dot(normal) + FLUSH;
+    let bounds = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
+    let region = Region { bounds, normal, heights: [above, f32::INFINITY] };
+    let rises = |surface: u32| scene.surfaces()[surface as usize].heights(normal).is_none_or(|[_, high]| high > above);
+    let unlit = (0..scene.lights.len()).all(|light| light_segment(scene, light, x, normal).1 <= 0.0);
+    unlit && !scene.visibility.any_in(&region, rises)
 }
 
 /// The unit normal of a flat surface on one of its sides.
-fn outward(geometry: &Geometry, side: Side) -> Vec3 {
+pub(crate) fn outward(geometry: &Geometry, side: Side) -> Vec3 {
     let normal = geometry.normal(Vec2::ZERO);
-    if side.is_multiple_of(2) { normal } else { -normal }
+    if is_back(side) { -normal } else { normal }
 }
 
 /// A place on a large side, which stands for what is around it; or a whole side.
@@ -105,11 +122,16 @@ struct Spot {
     next: u32,
 }
 
-/// A place that a spot sees.
-struct Met {
-    side: Side,
-    at: Vec3,
+/// What a ray from a spot met.
+enum Met {
+    /// Another spot, or what a line from there reaches.
+    Spot(u32),
+    /// A place on a large side that no spot there is known to belong to.
+    Place(Side, Vec3),
 }
+
+/// A few spots.
+type Spotted = SmallVec<[u32; NEAREST]>;
 
 /// What a spot sees that is not of its group.
 #[derive(Default)]
@@ -143,7 +165,7 @@ impl<'a> Spots<'a> {
         };
         let emits = |side: Side| {
             let material = scene.surface_materials[(side / 2) as usize];
-            side.is_multiple_of(2) && scene.materials[material as usize].exitance != Rgb::ZERO
+            !is_back(side) && scene.materials[material as usize].exitance != Rgb::ZERO
         };
         let takes_part = |&side: &Side| reflects(scene, idle, side) && (emits(side) || !faces_nothing(scene, side));
         let sides: Vec<Side> = (0..2 * count as u32).into_par_iter().filter(takes_part).collect();
@@ -156,7 +178,7 @@ impl<'a> Spots<'a> {
                 let u: Vec2 = point2(hash(side, 0x59), place);
                 let (at, _, _) = scene.surfaces()[(side / 2) as usize].sample_area(Domain::WHOLE, u.x, u.y);
                 let spot = spots.add(side, at, emits(side));
-                spots.join_around(spot, &Met { side, at });
+                spots.join_around(spot, side, at);
             }
         }
         spots
@@ -182,7 +204,15 @@ impl<'a> Spots<'a> {
         let seen: Vec<Seen> = looking.par_iter().with_min_len(16).map(look).collect();
         for (&spot, seen) in looking.iter().zip(&seen) {
             for met in &seen.met {
-                self.join(spot, met);
+                match *met {
+                    Met::Spot(other) => self.groups.join(spot, other),
+                    Met::Place(side, at) => {
+                        if !self.join_around(spot, side, at) && self.on_side(side).count() < MOST_SPOTS {
+                            let other = self.add(side, at, false);
+                            self.groups.join(spot, other);
+                        }
+                    }
+                }
             }
             if seen.light {
                 self.groups.light(spot);
@@ -203,13 +233,13 @@ impl<'a> Spots<'a> {
                 (at, outward(geometry, side))
             } else {
                 let (x, normal, _) = geometry.sample_area(Domain::WHOLE, u.x, u.y);
-                (x, if side.is_multiple_of(2) { normal } else { -normal })
+                (x, if is_back(side) { -normal } else { normal })
             };
             seen.light |= searching && sees_light(scene, surface, x, n, |_| true);
             let mut lit = seen.light;
-            if let Some((met, near)) = self.meet(spot, x, n, cosine_direction(n, u.z, u.w)) {
+            if let Some(met) = self.meet(spot, x, n, cosine_direction(n, u.z, u.w)) {
+                lit |= matches!(met, Met::Spot(other) if self.groups.is_known_lit(other));
                 seen.met.push(met);
-                lit |= self.groups.is_known_lit(near);
             }
             if searching && lit {
                 break;
@@ -218,51 +248,44 @@ impl<'a> Spots<'a> {
         seen
     }
 
-    /// What a ray from a spot meets of other groups, and the spot next to it.
-    fn meet(&self, spot: u32, x: Vec3, n: Vec3, direction: Vec3) -> Option<(Met, u32)> {
+    /// What a ray from a spot meets that is not known to be of its group.
+    fn meet(&self, spot: u32, x: Vec3, n: Vec3, direction: Vec3) -> Option<Met> {
         let visibility = &self.scene.visibility;
         let own = self.all[spot as usize].side / 2;
         let hit = visibility.closest_except(x, direction, 0.0, f32::MAX, own)?;
-        let met = Met { side: 2 * hit.surface + u32::from(!hit.front), at: hit.point };
-        let near = self
-            .nearest(&met)
-            .first()
-            .copied()
-            .filter(|&near| self.groups.known_root(near) != self.groups.known_root(spot))?;
+        let side = side_of(&hit);
+        let met = self.around(spot, side, hit.point)?;
         // Between surfaces that nearly meet single rays slip through: what is seen must be seen a little beside, too.
         let radius = visibility.geometries()[hit.surface as usize].bounds(Domain::WHOLE).radius();
         let turn = BESIDE.min(BESIDE_SHARE * radius / hit.t);
         let (a, b) = n.any_orthonormal_pair();
         let also = |aside: Vec3| {
             let hit = visibility.closest_except(x, direction + aside * turn, 0.0, f32::MAX, own);
-            hit.is_some_and(|hit| 2 * hit.surface + u32::from(!hit.front) == met.side)
+            hit.is_some_and(|hit| side_of(&hit) == side)
         };
-        (also(a) && also(b)).then_some((met, near))
+        (also(a) && also(b)).then_some(met)
     }
 
-    /// Joins a spot to what a ray from it met.
-    fn join(&mut self, spot: u32, met: &Met) {
-        if !self.large[(met.side / 2) as usize] {
-            self.groups.join(spot, self.of_side[met.side as usize]);
-            return;
+    /// What a spot may be joined to that sees a place on a side; `None` where that is of its group as far as is known.
+    fn around(&self, spot: u32, side: Side, at: Vec3) -> Option<Met> {
+        let root = self.groups.known_root(spot);
+        if !self.large[(side / 2) as usize] {
+            let other = self.of_side[side as usize];
+            return (other != NONE && self.groups.known_root(other) != root).then_some(Met::Spot(other));
         }
-        if !self.join_around(spot, met) && self.count(met.side) < MOST_SPOTS {
-            let other = self.add(met.side, met.at, false);
-            self.groups.join(spot, other);
+        let near = self.nearest(side, at);
+        let known = |other: u32| self.groups.known_root(other) == root;
+        match near.iter().find(|&&other| !known(other) && self.is_joined(side, at, other)) {
+            Some(&other) => Some(Met::Spot(other)),
+            None => (!near.is_empty() && !near.iter().any(|&other| known(other))).then_some(Met::Place(side, at)),
         }
     }
 
-    /// Joins a spot to those of the nearest to a place that it sees which a line just above their large flat side
-    /// reaches from there; tells whether there is any, or one that it belongs to already.
-    fn join_around(&mut self, spot: u32, place: &Met) -> bool {
-        let own = place.side / 2;
-        let lift = outward(&self.scene.surfaces()[own as usize], place.side) * ABOVE;
-        let mut blocker = u32::MAX;
+    /// Joins a spot to those around a place that it sees; tells whether there are any, or that it belongs to already.
+    fn join_around(&mut self, spot: u32, side: Side, at: Vec3) -> bool {
         let mut joined = false;
-        for other in self.nearest(place) {
-            let to = self.all[other as usize].at;
-            let known = self.groups.root(other) == self.groups.root(spot);
-            if known || !self.scene.visibility.occluded(place.at + lift, to + lift, [own, own], &mut blocker) {
+        for other in self.nearest(side, at) {
+            if self.groups.root(other) == self.groups.root(spot) || self.is_joined(side, at, other) {
                 self.groups.join(spot, other);
                 joined = true;
             }
@@ -270,12 +293,19 @@ impl<'a> Spots<'a> {
         joined
     }
 
-    /// The spots nearest to a place on their side, the nearest first.
-    fn nearest(&self, place: &Met) -> SmallVec<[u32; NEAREST]> {
-        let mut there: SmallVec<[(f32, u32); MOST_SPOTS]> = self
-            .on_side(place.side)
-            .map(|spot| (self.all[spot as usize].at.distance_squared(place.at), spot))
-            .collect();
+    /// Whether a line just above a large flat side leads from a place on it to a spot.
+    fn is_joined(&self, side: Side, at: Vec3, spot: u32) -> bool {
+        let own = side / 2;
+        let lift = outward(&self.scene.surfaces()[own as usize], side) * ABOVE;
+        let to = self.all[spot as usize].at;
+        !self.scene.visibility.occluded(at + lift, to + lift, [own, own], &mut { NO_BLOCKER })
+    }
+
+    /// The spots of a side that are nearest to a place on it, the nearest first.
+    fn nearest(&self, side: Side, at: Vec3) -> Spotted {
+        let distance = |spot: u32| self.all[spot as usize].at.distance_squared(at);
+        let mut there: SmallVec<[(f32, u32); MOST_SPOTS]> =
+            self.on_side(side).map(|spot| (distance(spot), spot)).collect();
         there.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         there.into_iter().take(NEAREST).map(|(_, spot)| spot).collect()
     }
@@ -284,10 +314,6 @@ impl<'a> Spots<'a> {
     fn on_side(&self, side: Side) -> impl Iterator<Item = u32> {
         let known = |spot: u32| (spot != NONE).then_some(spot);
         std::iter::successors(known(self.of_side[side as usize]), move |&spot| known(self.all[spot as usize].next))
-    }
-
-    fn count(&self, side: Side) -> usize {
-        self.on_side(side).count()
     }
 }
 
@@ -299,13 +325,7 @@ pub(crate) fn cosine_direction(n: Vec3, u: f32, v: f32) -> Vec3 {
 }
 
 /// Whether a point of a surface with normal `n` sees one of those lights without extent that are `wanted`.
-pub(crate) fn sees_light(
-    scene: &SceneData,
-    surface: u32,
-    x: Vec3,
-    n: Vec3,
-    wanted: impl Fn(&crate::Light) -> bool,
-) -> bool {
+pub(crate) fn sees_light(scene: &SceneData, surface: u32, x: Vec3, n: Vec3, wanted: impl Fn(&Light) -> bool) -> bool {
     let mut blocker = u32::MAX;
     scene.lights.iter().enumerate().filter(|(_, light)| wanted(light)).any(|(light, _)| {
         let (to, cosine) = light_segment(scene, light, x, n);

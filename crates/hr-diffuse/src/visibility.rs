@@ -82,6 +82,13 @@ enum Primitive {
     Curved,
 }
 
+/// Part of space: a box, between two heights along a unit normal.
+pub(crate) struct Region {
+    pub(crate) bounds: Aabb,
+    pub(crate) normal: Vec3,
+    pub(crate) heights: [f32; 2],
+}
+
 /// A ray with what slab tests need.
 struct Ray {
     origin: Vec3,
@@ -313,12 +320,13 @@ impl Visibility {
         Some(Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 })
     }
 
-    /// Whether any surface rises above the plane through a point with this unit normal, by more than what an end of a
-    /// segment may touch. Where a curved surface comes near it, its box decides.
-    pub(crate) fn any_above(&self, point: Vec3, normal: Vec3) -> bool {
-        let n = [0, 1, 2].map(|i| Vec4::splat(normal[i]));
-        let plane = Vec4::splat(normal.dot(point) + END_TRIM);
-        let high = [0, 1, 2].map(|i| 2 * i + usize::from(normal[i] > 0.0));
+    /// Whether any surface whose box, about, reaches into a region is `wanted`.
+    pub(crate) fn any_in(&self, region: &Region, wanted: impl Fn(u32) -> bool) -> bool {
+        let [low, high] = [region.bounds.min, region.bounds.max].map(|p| p.to_array().map(Vec4::splat));
+        let normal = region.normal.to_array().map(Vec4::splat);
+        let [least, most] = region.heights.map(Vec4::splat);
+        // Indices of the bounds that lie lowest along the normal.
+        let lowest = [0, 1, 2].map(|axis| 2 * axis + usize::from(region.normal[axis] < 0.0));
         let mut stack: SmallVec<[u32; 64]> = SmallVec::new();
         if !self.nodes.is_empty() {
             stack.push(0);
@@ -326,13 +334,11 @@ impl Visibility {
         while let Some(index) = stack.pop() {
             if index & LEAF == 0 {
                 let Node { bounds, children } = &self.nodes[index as usize];
-                let reach =
-                    |bound: [usize; 3]| n[0] * bounds[bound[0]] + n[1] * bounds[bound[1]] + n[2] * bounds[bound[2]];
-                let exists = bounds[0].cmple(bounds[1]).bitmask();
-                if reach(high.map(|i| i ^ 1)).cmpgt(plane).bitmask() & exists != 0 {
-                    return true;
-                }
-                let mut mask = reach(high).cmpgt(plane).bitmask() & exists;
+                let overlap = |axis: usize| bounds[2 * axis].cmple(high[axis]) & bounds[2 * axis + 1].cmpge(low[axis]);
+                let height =
+                    |[x, y, z]: [usize; 3]| normal[0] * bounds[x] + normal[1] * bounds[y] + normal[2] * bounds[z];
+                let between = height(lowest).cmple(most) & height(lowest.map(|i| i ^ 1)).cmpge(least);
+                let mut mask = (overlap(0) & overlap(1) & overlap(2) & between).bitmask();
                 while mask != 0 {
                     stack.push(children[mask.trailing_zeros() as usize & 3]);
                     mask &= mask - 1;
@@ -340,11 +346,7 @@ impl Visibility {
                 continue;
             }
             let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
-            let rises = |primitive: &Primitive| match primitive {
-                Primitive::Polygon(outline) => outline.heights(normal).max_element() > plane.x,
-                Primitive::Curved => true,
-            };
-            if self.primitives[first as usize..(first + count) as usize].iter().any(rises) {
+            if self.surfaces[first as usize..(first + count) as usize].iter().any(|&surface| wanted(surface)) {
                 return true;
             }
         }

@@ -189,11 +189,6 @@ impl Outline {
         }
     }
 
-    /// How far the corners lie in a direction.
-    pub(crate) fn heights(&self, direction: Vec3) -> Vec4 {
-        self.x * direction.x + self.y * direction.y + self.z * direction.z
-    }
-
     /// Where a ray meets the polygon, from either side, with `t_min` < t < `t_max`.
     ///
     /// The test is by signed volumes of the ray and the edges (Plücker coordinates), relative to the origin of the
