@@ -10,7 +10,7 @@
 use crate::geometry::{Domain, Geometry};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::sampling::{hash, point2};
-use crate::sealed::{Side, cosine_direction, is_back, outward, side_of};
+use crate::sealed::{Side, cosine_direction, is_back, outward};
 use crate::visibility::Region;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -92,8 +92,8 @@ fn exposed_share(scene: &SceneData, elements: &Elements, leaf: u32) -> f32 {
         let (x, normal, _) = geometry.sample_area(element.domain, u.x, u.y);
         let v = point2(hash(leaf, 0xe8), i * RAYS + ray);
         let direction = cosine_direction(normal * sign, v.x, v.y);
-        let hit = scene.visibility.closest_except(x, direction, 0.0, f32::MAX, element.source);
-        hit.is_some_and(|hit| is_dark(scene, elements, side_of(&hit)))
+        let met = scene.visibility.first_side(x, direction, element.source);
+        met.is_some_and(|(side, _)| is_dark(scene, elements, side))
     };
     if !(0..FIRST_POINTS).any(|i| dark(i, 0)) {
         return 1.0;

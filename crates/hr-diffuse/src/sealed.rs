@@ -12,7 +12,7 @@ use crate::geometry::{Aabb, Domain, Geometry};
 use crate::hierarchy::SceneData;
 use crate::sampling::{hash, point2, point4};
 use crate::segments::light_segment;
-use crate::visibility::{Hit, NO_BLOCKER, Region};
+use crate::visibility::{NO_BLOCKER, Region};
 use crate::{Light, Rgb};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -51,11 +51,6 @@ pub(crate) type Side = u32;
 
 pub(crate) fn is_back(side: Side) -> bool {
     !side.is_multiple_of(2)
-}
-
-/// The side that a ray hit.
-pub(crate) fn side_of(hit: &Hit) -> Side {
-    2 * hit.surface + u32::from(!hit.front)
 }
 
 /// For each surface, whether its front and its back may be lit. Where nothing is, everything counts as if it were: there
@@ -252,16 +247,15 @@ impl<'a> Spots<'a> {
     fn meet(&self, spot: u32, x: Vec3, n: Vec3, direction: Vec3) -> Option<Met> {
         let visibility = &self.scene.visibility;
         let own = self.all[spot as usize].side / 2;
-        let hit = visibility.closest_except(x, direction, 0.0, f32::MAX, own)?;
-        let side = side_of(&hit);
-        let met = self.around(spot, side, hit.point)?;
+        let (side, t) = visibility.first_side(x, direction, own)?;
+        let met = self.around(spot, side, x + direction * t)?;
         // Between surfaces that nearly meet single rays slip through: what is seen must be seen a little beside, too.
-        let radius = visibility.geometries()[hit.surface as usize].bounds(Domain::WHOLE).radius();
-        let turn = BESIDE.min(BESIDE_SHARE * radius / hit.t);
+        let radius = visibility.geometries()[(side / 2) as usize].bounds(Domain::WHOLE).radius();
+        let turn = BESIDE.min(BESIDE_SHARE * radius / t);
         let (a, b) = n.any_orthonormal_pair();
         let also = |aside: Vec3| {
-            let hit = visibility.closest_except(x, direction + aside * turn, 0.0, f32::MAX, own);
-            hit.is_some_and(|hit| side_of(&hit) == side)
+            let met = visibility.first_side(x, direction + aside * turn, own);
+            met.is_some_and(|met| met.0 == side)
         };
         (also(a) && also(b)).then_some(met)
     }

@@ -5,6 +5,7 @@
 //! [`Geometry`]. No ray allocates, and every query is a pure function: results do not depend on the thread.
 
 use crate::geometry::{Aabb, Geometry, Outline};
+use crate::sealed::Side;
 use glam::{Vec2, Vec3, Vec3A, Vec4};
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
@@ -273,6 +274,24 @@ impl Visibility {
     /// one not within the distance that rounding explains.
     #[must_use]
     pub fn closest_except(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, own: u32) -> Option<Hit> {
+        let (t, surface) = self.nearest(origin, direction, t_min, t_max, own)?;
+        let geometry = &self.geometries[surface as usize];
+        let uv = geometry.parameters_of(origin + direction * t);
+        let normal = geometry.normal(uv);
+        Some(Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 })
+    }
+
+    /// The side that a ray from the surface `own` meets first, and at which multiple of its direction.
+    pub(crate) fn first_side(&self, origin: Vec3, direction: Vec3, own: u32) -> Option<(Side, f32)> {
+        let (t, surface) = self.nearest(origin, direction, 0.0, f32::MAX, own)?;
+        let geometry = &self.geometries[surface as usize];
+        // Where the normal is the same everywhere, the place on the surface need not be found.
+        let uv = if geometry.is_flat() { Vec2::ZERO } else { geometry.parameters_of(origin + direction * t) };
+        Some((2 * surface + u32::from(geometry.normal(uv).dot(direction) >= 0.0), t))
+    }
+
+    /// Distance and surface of the hit that [`closest_except`](Self::closest_except) tells more about.
+    fn nearest(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, own: u32) -> Option<(f32, u32)> {
         let length = direction.length();
         if !(length > 0.0 && length.is_finite() && origin.is_finite()) || self.nodes.is_empty() {
             return None;
@@ -292,9 +311,13 @@ impl Visibility {
                 while mask != 0 {
                     let child = mask.trailing_zeros() as usize & 3;
                     mask &= mask - 1;
+                    stack.push((node.children[child], near[child]));
                     // The nearest last, to be popped first.
-                    let at = stack[base..].iter().position(|&(_, t)| t < near[child]).unwrap_or(stack.len() - base);
-                    stack.insert(base + at, (node.children[child], near[child]));
+                    let mut at = stack.len() - 1;
+                    while at > base && stack[at - 1].1 < stack[at].1 {
+                        stack.swap(at - 1, at);
+                        at -= 1;
+                    }
                 }
                 continue;
             }
@@ -319,11 +342,7 @@ impl Visibility {
                 }
             }
         }
-        let (t, surface) = (best.0, best.1?);
-        let geometry = &self.geometries[surface as usize];
-        let uv = geometry.parameters_of(origin + direction * t);
-        let normal = geometry.normal(uv);
-        Some(Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 })
+        best.1.map(|surface| (best.0, surface))
     }
 
     /// Whether any surface whose box, about, reaches into a region is `wanted`.
