@@ -92,7 +92,7 @@ fn exposed_share(scene: &SceneData, elements: &Elements, leaf: u32) -> f32 {
         let (x, normal, _) = geometry.sample_area(element.domain, u.x, u.y);
         let v = point2(hash(leaf, 0xe8), i * RAYS + ray);
         let direction = cosine_direction(normal * sign, v.x, v.y);
-        let met = scene.visibility.first_side(x, direction, element.source);
+        let met = scene.visibility.first_side(x, direction, f32::MAX, element.source);
         met.is_some_and(|(side, _)| is_dark(scene, elements, side))
     };
     if !(0..FIRST_POINTS).any(|i| dark(i, 0)) {

@@ -28,6 +28,8 @@ const ROUNDS: [u32; 6] = [1, 2, 8, 32, 128, 384];
 /// go beside by a share of the radius of what was met.
 const BESIDE: f32 = 2e-3;
 const BESIDE_SHARE: f32 = 0.1;
+/// These meet it at no more than so many times the distance, unless it is seen edge-on.
+const NEARLY: f32 = 1.1;
 
 /// Flat surfaces whose radius in unit space is larger have several spots, so many at first and at most.
 const LARGE: f32 = 0.02;
@@ -247,14 +249,14 @@ impl<'a> Spots<'a> {
     fn meet(&self, spot: u32, x: Vec3, n: Vec3, direction: Vec3) -> Option<Met> {
         let visibility = &self.scene.visibility;
         let own = self.all[spot as usize].side / 2;
-        let (side, t) = visibility.first_side(x, direction, own)?;
+        let (side, t) = visibility.first_side(x, direction, f32::MAX, own)?;
         let met = self.around(spot, side, x + direction * t)?;
         // Between surfaces that nearly meet single rays slip through: what is seen must be seen a little beside, too.
         let radius = visibility.geometries()[(side / 2) as usize].bounds(Domain::WHOLE).radius();
         let turn = BESIDE.min(BESIDE_SHARE * radius / t);
         let (a, b) = n.any_orthonormal_pair();
         let also = |aside: Vec3| {
-            let met = visibility.first_side(x, direction + aside * turn, own);
+            let met = visibility.first_side(x, direction + aside * turn, NEARLY * t, own);
             met.is_some_and(|met| met.0 == side)
         };
         (also(a) && also(b)).then_some(met)

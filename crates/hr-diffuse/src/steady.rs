@@ -94,7 +94,7 @@ fn look(scene: &SceneData, entire: &[bool], side: Side, rays: u32, channel: usiz
         let (x, normal, _) = scene.surfaces()[surface as usize].sample_area(Domain::WHOLE, u.x, u.y);
         let n = if back { -normal } else { normal };
         let direction = cosine_direction(n, u.z, u.w);
-        match scene.visibility.first_side(x, direction, surface) {
+        match scene.visibility.first_side(x, direction, f32::MAX, surface) {
             Some((other, _)) if entire[other as usize] => seen.sides.push(other),
             _ => {
                 seen.leaks = true;

@@ -4,15 +4,15 @@
 //! hold the outlines of polygons, which is all that a test needs; curved surfaces are tested in f64 through their
 //! [`Geometry`]. No ray allocates, and every query is a pure function: results do not depend on the thread.
 
-use crate::geometry::{Aabb, Geometry, Outline};
+use crate::geometry::{Aabb, Domain, Geometry, Outline};
 use crate::sealed::Side;
 use glam::{Vec2, Vec3, Vec3A, Vec4};
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use obvhs::{Boundable, BvhBuildParams};
+use rayon::prelude::*;
 use smallvec::SmallVec;
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// What an end of a segment may touch without being blocked, in unit space: surfaces that abut there. Positions are
@@ -281,9 +281,10 @@ impl Visibility {
         Some(Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 })
     }
 
-    /// The side that a ray from the surface `own` meets first, and at which multiple of its direction.
-    pub(crate) fn first_side(&self, origin: Vec3, direction: Vec3, own: u32) -> Option<(Side, f32)> {
-        let (t, surface) = self.nearest(origin, direction, 0.0, f32::MAX, own)?;
+    /// The side that a ray from the surface `own` meets first, with t < `t_max`, and at which t, in multiples of its
+    /// direction.
+    pub(crate) fn first_side(&self, origin: Vec3, direction: Vec3, t_max: f32, own: u32) -> Option<(Side, f32)> {
+        let (t, surface) = self.nearest(origin, direction, 0.0, t_max, own)?;
         let geometry = &self.geometries[surface as usize];
         // Where the normal is the same everywhere, the place on the surface need not be found.
         let uv = if geometry.is_flat() { Vec2::ZERO } else { geometry.parameters_of(origin + direction * t) };
@@ -476,17 +477,18 @@ impl Boundable for GroupBox {
 impl Groups {
     fn new(geometries: &[Geometry], first: &[u32]) -> Self {
         // In order of the boxes' bits: no hashing, thus the same tree every time.
-        let mut groups: BTreeMap<[u32; 6], (Aabb, Vec<u32>)> = BTreeMap::new();
-        for (surface, geometry) in geometries.iter().enumerate().filter(|(i, _)| first[*i] as usize == *i) {
-            let bounds = geometry.bounds(crate::geometry::Domain::WHOLE);
-            let [a, b, c] = bounds.min.to_array().map(f32::to_bits);
-            let [d, e, f] = bounds.max.to_array().map(f32::to_bits);
-            groups.entry([a, b, c, d, e, f]).or_insert((bounds, Vec::new())).1.push(surface as u32);
-        }
-        let mut result = Self { boxes: Vec::new(), surfaces: Vec::new(), starts: vec![0] };
-        for (bounds, members) in groups.into_values() {
-            result.boxes.push(GroupBox(bounds));
-            result.surfaces.extend(members);
+        let bounds = |surface: u32| {
+            let bounds = geometries[surface as usize].bounds(Domain::WHOLE);
+            ([bounds.min, bounds.max].map(|p| p.to_array().map(f32::to_bits)), surface)
+        };
+        let own = (0..geometries.len() as u32).into_par_iter().filter(|&surface| first[surface as usize] == surface);
+        let mut sorted: Vec<([[u32; 3]; 2], u32)> = own.map(bounds).collect();
+        sorted.par_sort_unstable();
+        let mut result = Self { boxes: Vec::new(), surfaces: Vec::with_capacity(sorted.len()), starts: vec![0] };
+        for group in sorted.chunk_by(|a, b| a.0 == b.0) {
+            let [min, max] = group[0].0.map(|bits| Vec3::from_array(bits.map(f32::from_bits)));
+            result.boxes.push(GroupBox(Aabb { min, max }));
+            result.surfaces.extend(group.iter().map(|&(_, surface)| surface));
             result.starts.push(result.surfaces.len());
         }
         result
@@ -503,7 +505,7 @@ impl Groups {
             // Above 0 the lowest levels are paired hastily, which costs large scenes a factor in every ray.
             search_depth_threshold: 0,
             reinsertion_batch_ratio: 0.2,
-            post_collapse_reinsertion_batch_ratio_multiplier: 2.0,
+            post_collapse_reinsertion_batch_ratio_multiplier: 1.0,
             sort_precision: SortPrecision::U64,
             max_prims_per_leaf: 4,
             collapse_traversal_cost: 1.5,
