@@ -21,8 +21,10 @@ use std::f32::consts::TAU;
 use std::ops::Range;
 
 /// Rays that a group shares in successive rounds; only groups that are still dark take part in the next one, and
-/// emitters. Every spot has one at least.
+/// emitters.
 const ROUNDS: [u32; 6] = [1, 2, 8, 32, 128, 384];
+/// In rounds with so many rays every spot has one at least.
+const ALL_SPOTS: u32 = 128;
 
 /// Rays are confirmed by others that turn away from them by this (radians), or where this is less, so much that they
 /// go beside by a share of the radius of what was met.
@@ -194,6 +196,13 @@ impl<'a> Spots<'a> {
         for &spot in looking {
             sharing[self.groups.known_root(spot)] += 1;
         }
+        let mut passed = vec![0_u32; self.all.len()];
+        let takes_turn = |&spot: &u32| {
+            let root = self.groups.known_root(spot);
+            passed[root] += 1;
+            rays >= ALL_SPOTS || passed[root].is_multiple_of(sharing[root].div_ceil(rays))
+        };
+        let looking: Vec<u32> = looking.iter().copied().filter(takes_turn).collect();
         let look = |&spot: &u32| {
             let share = rays / sharing[self.groups.known_root(spot)];
             self.look(spot, first..first + share.max(1))
