@@ -1,7 +1,7 @@
 //! The element hierarchy: flat arrays indexed by a node id; children are contiguous and come after their parent,
 //! so that push is one forward sweep and pull one backward sweep.
 //!
-//! From the root down: clusters (those of the tree that answers rays), then one element per surface and reflecting side, then
+//! From the root down: clusters (an obvhs tree, widened), then one element per surface and reflecting side, then
 //! the parts that refinement makes of it. A two-sided surface has two incident fields, so its front and its back
 //! are two elements. Lights without extent are leaves that only send.
 
@@ -10,16 +10,17 @@ use crate::geometry::{Domain, FACETS, Facet, Geometry};
 use crate::hooks::{FLAT_COSINE, Hierarchy, NodeId};
 use crate::scene::{Light, LightKind};
 use crate::sealed::{Side, is_back, lit_sides};
-use crate::visibility::{Branch, Visibility};
+use crate::visibility::Visibility;
 use crate::{Cone, DiffuseMaterial, Facing, Rgb, SurfaceReflectance};
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 use smallvec::SmallVec;
-use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Children per cluster, at most.
+/// Children per cluster: the binary tree is widened to it.
 const FAN_OUT: usize = 4;
 
 /// What a node stands for.
@@ -182,50 +183,55 @@ pub struct Elements {
     pub(crate) exposed: Vec<f32>,
 }
 
+struct Boxed(obvhs::aabb::Aabb);
+impl obvhs::Boundable for Boxed {
+    fn aabb(&self) -> obvhs::aabb::Aabb {
+        self.0
+    }
+}
+
 impl Elements {
     /// Builds clusters and one element per surface and reflecting side. `extra` tells how much an extension
     /// reflects of a material beside the diffuse part; `None` where it takes no part.
     pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<Rgb>) -> Self {
-        let count = scene.surfaces().len();
-        let glossy: Vec<Option<Rgb>> = (0..scene.materials.len() as u32).map(extra).collect();
-        let reflects = |surface: u32| {
-            let glossy = glossy[scene.surface_materials[surface as usize] as usize].unwrap_or(Rgb::ZERO);
-            (scene.reflectance(surface, &Domain::WHOLE) + glossy).max_element() > 0.0
-        };
-        let reflects: Vec<bool> = (0..count as u32).into_par_iter().map(reflects).collect();
-        let material = |surface: usize| &scene.materials[scene.surface_materials[surface] as usize];
-        let idle = |surface: usize| {
-            scene.is_twin(surface as u32) || !reflects[surface] && material(surface).exitance == Rgb::ZERO
-        };
-        let idle: Vec<bool> = (0..count).map(idle).collect();
-        let mut sides = vec![[false; 2]; count];
-        let mut sealed = vec![[false; 2]; count];
+        let mut roots: Vec<Element> = Vec::new();
+        let mut sealed = vec![[false; 2]; scene.surfaces().len()];
+        let idle = idle(scene, &extra);
         for (i, lit) in lit_sides(scene, &idle).into_iter().enumerate() {
             if scene.is_twin(i as u32) {
                 continue;
             }
             // Black ones are there to be shown.
-            let front = lit[0] || idle[i];
-            let back = material(i).two_sided && reflects[i];
-            sides[i] = [front, back && lit[1]];
-            sealed[i] = [!front, back && !lit[1]];
+            let lit = [lit[0] || idle[i], lit[1]];
+            let material = &scene.materials[scene.surface_materials[i] as usize];
+            let glossy = extra(scene.surface_materials[i]);
+            let front = patch(scene, i as u32, Kind::Front, Domain::WHOLE, glossy);
+            let back = material.two_sided && front.importance > 0.0;
+            if lit[0] {
+                roots.push(front);
+            }
+            if back && lit[1] {
+                roots.push(patch(scene, i as u32, Kind::Back, Domain::WHOLE, glossy));
+            }
+            sealed[i] = [!lit[0], back && !lit[1]];
         }
         // Fronts and backs in trees of their own: what a cluster faces is then known better.
+        let (fronts, backs): (Vec<Element>, Vec<Element>) = roots.into_iter().partition(|e| e.kind == Kind::Front);
+        let lights: Vec<Element> = (0..scene.lights.len()).map(|i| light(scene, i as u32)).collect();
         let mut trees: Vec<Tree> = Vec::new();
-        for (i, kind) in [Kind::Front, Kind::Back].into_iter().enumerate() {
-            trees.extend(Tree::of_sides(&scene.visibility, kind, |surface| sides[surface as usize][i]));
-        }
-        trees.extend((0..scene.lights.len() as u32).map(|i| Tree::Leaf(Kind::Light, i)));
+        trees.extend(Tree::build(fronts));
+        trees.extend(Tree::build(backs));
+        trees.extend(lights.into_iter().map(Tree::Leaf));
         let root = if trees.len() == 1 { trees.remove(0) } else { Tree::Inner(trees) };
         let mut elements = Self {
             nodes: Vec::new(),
-            surface_nodes: vec![[u32::MAX; 2]; count],
+            surface_nodes: vec![[u32::MAX; 2]; scene.surfaces().len()],
             facets: Vec::new(),
             sealed,
             touched: Vec::new(),
             exposed: Vec::new(),
         };
-        elements.flatten(scene, &glossy, root);
+        elements.flatten(root);
         for (surface, &twin) in scene.twins.iter().enumerate() {
             elements.surface_nodes[surface] = elements.surface_nodes[twin as usize];
         }
@@ -280,17 +286,18 @@ impl Elements {
     }
 
     /// Lays the tree out breadth first, and fills clusters bottom-up.
-    fn flatten(&mut self, scene: &SceneData, glossy: &[Option<Rgb>], root: Tree) {
-        let mut queue = VecDeque::from([(root, 0_u32)]);
+    fn flatten(&mut self, root: Tree) {
+        let mut queue = std::collections::VecDeque::from([(root, 0_u32)]);
         let mut next = 1_u32;
         while let Some((tree, parent)) = queue.pop_front() {
             let id = self.nodes.len() as u32;
             match tree {
-                Tree::Leaf(kind, source) => {
-                    self.nodes.push(Element { parent, kind, source, ..EMPTY });
-                    if kind != Kind::Light {
-                        self.surface_nodes[source as usize][usize::from(kind == Kind::Back)] = id;
+                Tree::Leaf(mut element) => {
+                    element.parent = parent;
+                    if element.is_patch() {
+                        self.surface_nodes[element.source as usize][usize::from(element.kind == Kind::Back)] = id;
                     }
+                    self.nodes.push(element);
                 }
                 Tree::Inner(children) => {
                     self.nodes.push(Element { parent, first_child: next, child_count: children.len() as u32, ..EMPTY });
@@ -299,17 +306,6 @@ impl Elements {
                 }
             }
         }
-        self.nodes.par_iter_mut().with_min_len(64).for_each(|node| {
-            let Element { parent, kind, source, .. } = *node;
-            *node = match kind {
-                Kind::Cluster => return,
-                Kind::Light => Element { parent, ..light(scene, source) },
-                Kind::Front | Kind::Back => {
-                    let glossy = glossy[scene.surface_materials[source as usize] as usize];
-                    Element { parent, ..patch(scene, source, kind, Domain::WHOLE, glossy) }
-                }
-            };
-        });
         for id in (0..self.nodes.len()).rev() {
             if self.nodes[id].kind == Kind::Cluster {
                 self.nodes[id] = self.cluster(id);
@@ -415,6 +411,17 @@ const EMPTY: Element = Element {
     convex: false,
 };
 
+/// For each surface whether it does nothing with light but hide it: it is black, or coincides with another one.
+fn idle(scene: &SceneData, extra: &impl Fn(u32) -> Option<Rgb>) -> Vec<bool> {
+    let black = |surface: u32| {
+        let material = scene.surface_materials[surface as usize];
+        let glossy = extra(material).unwrap_or(Rgb::ZERO);
+        let reflects = (scene.reflectance(surface, &Domain::WHOLE) + glossy).max_element() > 0.0;
+        !reflects && scene.materials[material as usize].exitance == Rgb::ZERO
+    };
+    (0..scene.surfaces().len() as u32).map(|surface| scene.is_twin(surface) || black(surface)).collect()
+}
+
 /// An element for a part of a surface.
 fn patch(scene: &SceneData, surface: u32, kind: Kind, domain: Domain, glossy: Option<Rgb>) -> Element {
     let geometry = &scene.surfaces()[surface as usize];
@@ -464,39 +471,63 @@ fn light(scene: &SceneData, index: u32) -> Element {
 
 /// A tree of elements before it is laid out.
 enum Tree {
-    /// A surface or a light.
-    Leaf(Kind, u32),
+    Leaf(Element),
     Inner(Vec<Tree>),
 }
 
 impl Tree {
-    /// The surfaces that are `wanted`, clustered as in the tree for rays; `None` where there are none.
-    fn of_sides(visibility: &Visibility, kind: Kind, wanted: impl Fn(u32) -> bool) -> Option<Self> {
-        let mut of_node: Vec<Option<Self>> = std::iter::repeat_with(|| None).take(visibility.node_count()).collect();
-        for node in (0..of_node.len()).rev() {
-            let mut parts = Vec::new();
-            for branch in visibility.branches(node) {
-                parts.extend(match branch {
-                    Branch::Node(child) => of_node[child].take(),
-                    Branch::Surfaces(surfaces) => {
-                        let wanted = surfaces.iter().filter(|&&surface| wanted(surface));
-                        Self::bundle(wanted.map(|&surface| Self::Leaf(kind, surface)).collect())
-                    }
-                });
-            }
-            of_node[node] = Self::bundle(parts);
+    fn build(elements: Vec<Element>) -> Option<Self> {
+        if elements.len() <= 1 {
+            return elements.into_iter().next().map(Tree::Leaf);
         }
-        of_node.into_iter().next().flatten()
+        let boxes: Vec<Boxed> = elements
+            .iter()
+            .map(|e| Boxed(obvhs::aabb::Aabb::new(Vec3A::from(e.bounds[0]), Vec3A::from(e.bounds[1]))))
+            .collect();
+        let params = BvhBuildParams {
+            pre_split: false,
+            ploc_search_distance: PlocSearchDistance::High,
+            search_depth_threshold: 0,
+            reinsertion_batch_ratio: 0.2,
+            post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
+            sort_precision: SortPrecision::U64,
+            max_prims_per_leaf: 1,
+            collapse_traversal_cost: 1.0,
+        };
+        let bvh = obvhs::bvh2::builder::build_bvh2(&boxes, params, &mut std::time::Duration::default());
+        let mut slots: Vec<Option<Element>> = elements.into_iter().map(Some).collect();
+        Some(Self::convert(&bvh, 0, &mut slots))
     }
 
-    /// One tree of several.
-    fn bundle(mut parts: Vec<Self>) -> Option<Self> {
-        while parts.len() > FAN_OUT {
-            let mut rest = parts.into_iter();
-            let next = || Self::bundle(rest.by_ref().take(FAN_OUT).collect());
-            parts = std::iter::from_fn(next).collect();
+    fn convert(bvh: &obvhs::bvh2::Bvh2, node: usize, slots: &mut [Option<Element>]) -> Self {
+        let primitives =
+            |n: &obvhs::bvh2::node::Bvh2Node| n.first_index as usize..(n.first_index + n.prim_count) as usize;
+        let leaf = |node: &obvhs::bvh2::node::Bvh2Node, slots: &mut [Option<Element>]| -> Vec<Tree> {
+            primitives(node).filter_map(|i| slots[bvh.primitive_indices[i] as usize].take()).map(Tree::Leaf).collect()
+        };
+        let start = &bvh.nodes[node];
+        if start.is_leaf() {
+            let mut leaves = leaf(start, slots);
+            return if leaves.len() == 1 { leaves.remove(0) } else { Tree::Inner(leaves) };
         }
-        if parts.len() > 1 { Some(Self::Inner(parts)) } else { parts.pop() }
+        // Widening: open the largest inner node until the fan-out is reached.
+        let mut open: Vec<usize> = vec![start.first_index as usize, start.first_index as usize + 1];
+        while open.len() < FAN_OUT {
+            let largest = open
+                .iter()
+                .enumerate()
+                .filter(|(_, n)| !bvh.nodes[**n].is_leaf())
+                .max_by(|a, b| {
+                    let size = |n: usize| bvh.nodes[n].aabb().half_area();
+                    size(*a.1).total_cmp(&size(*b.1)).then(b.0.cmp(&a.0))
+                })
+                .map(|(i, _)| i);
+            let Some(i) = largest else { break };
+            let first = bvh.nodes[open[i]].first_index as usize;
+            open[i] = first;
+            open.insert(i + 1, first + 1);
+        }
+        Tree::Inner(open.into_iter().map(|n| Self::convert(bvh, n, slots)).collect())
     }
 }
 

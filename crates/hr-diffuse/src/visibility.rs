@@ -90,12 +90,6 @@ pub(crate) struct Region {
     pub(crate) heights: [f32; 2],
 }
 
-/// Part of a node of the tree.
-pub(crate) enum Branch<'a> {
-    Node(usize),
-    Surfaces(&'a [u32]),
-}
-
 /// A ray with what slab tests need.
 struct Ray {
     origin: Vec3,
@@ -377,23 +371,6 @@ impl Visibility {
             }
         }
         false
-    }
-
-    pub(crate) fn node_count(&self) -> usize {
-        self.nodes.len()
-    }
-
-    /// What a node of the tree is made of: nodes after it, and surfaces. The root is the first node.
-    pub(crate) fn branches(&self, node: usize) -> impl Iterator<Item = Branch<'_>> {
-        let Node { bounds, children } = &self.nodes[node];
-        let filled = (0..4).filter(|&i| bounds[0][i] <= bounds[1][i]);
-        filled.map(|i| {
-            if children[i] & LEAF == 0 {
-                return Branch::Node(children[i] as usize);
-            }
-            let Leaf { first, count } = self.leaves[(children[i] & !LEAF) as usize];
-            Branch::Surfaces(&self.surfaces[first as usize..(first + count) as usize])
-        })
     }
 
     /// Turns the binary tree into nodes of four children, parents before children.
