@@ -3,9 +3,16 @@
 //! A leaf that reaches under the box has the irradiance of what lies open, and shines with that radiosity, but only from
 //! there. Its mean over all of the leaf, sent from all of the leaf, would lose light under the box: twice the same part.
 
+//!
+//! What covers it stands on it or goes through it, and has a dark side toward it. Where no surface is like that, which
+//! planes and boxes tell, no rays are shot.
+
+use crate::geometry::{Domain, Geometry};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::sampling::{hash, point2};
-use crate::sealed::cosine_direction;
+use crate::sealed::{Side, cosine_direction, is_back, outward};
+use crate::visibility::Region;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Points of a leaf that are looked from at first, and where some of them see what nobody else does.
@@ -15,6 +22,11 @@ const POINTS: u32 = 24;
 const RAYS: u32 = 3;
 /// Less than this share of a leaf is taken for so much: what little is there is known too badly.
 const LEAST: f32 = 0.5;
+
+/// What stands this much above a surface, in unit space, or less, is taken to stand on it.
+const TOUCHING: f32 = 1e-3;
+/// How far corners must lie to one side of a plane to count: an edge that surfaces share may be off by its rounding.
+const ASIDE: f32 = 1e-5;
 
 /// Finds the shares of new nodes' areas that light may reach: 1 for all but leaves that are flat, 0 for wholly covered ones.
 pub(crate) fn expose(scene: &SceneData, elements: &mut Elements) {
@@ -27,25 +39,61 @@ pub(crate) fn expose(scene: &SceneData, elements: &mut Elements) {
     elements.exposed.extend(new);
 }
 
+/// Whether light that meets a side goes nowhere from there: it is sealed, or the inside of something.
+fn is_dark(scene: &SceneData, elements: &Elements, side: Side) -> bool {
+    let material = &scene.materials[scene.surface_materials[(side / 2) as usize] as usize];
+    is_back(side) && !material.two_sided || elements.is_sealed(side)
+}
+
+/// Whether part of a side may be covered by a surface that touches it.
+pub(crate) fn is_touched(scene: &SceneData, elements: &Elements, side: Side) -> bool {
+    let geometry = &scene.surfaces()[(side / 2) as usize];
+    let bounds = geometry.bounds(Domain::WHOLE).padded(TOUCHING);
+    let region = match plane(geometry, side) {
+        Some((normal, height)) => Region { bounds, normal, heights: [height + ASIDE, height + TOUCHING] },
+        None => Region { bounds, normal: Vec3::ZERO, heights: [f32::NEG_INFINITY, f32::INFINITY] },
+    };
+    scene.visibility.any_in(&region, |other| {
+        let dark = [2 * other, 2 * other + 1].map(|side| is_dark(scene, elements, side));
+        other != side / 2 && dark != [false; 2] && covers(&scene.surfaces()[other as usize], dark, geometry, &region)
+    })
+}
+
+/// Whether a surface of which some sides are dark may cover part of one, about which is a region. Of two polygons, the
+/// one reaches into the region, and the other has corners where a dark side looks.
+fn covers(surface: &Geometry, dark: [bool; 2], covered: &Geometry, region: &Region) -> bool {
+    let (Some([low, high]), Some((normal, height))) = (surface.heights(region.normal), plane(surface, 0)) else {
+        return true;
+    };
+    let Some([behind, before]) = covered.heights(normal) else { return true };
+    let reaches = high > region.heights[0] && low < region.heights[1];
+    reaches && (dark[0] && before > height + ASIDE || dark[1] && behind < height - ASIDE)
+}
+
+/// The plane of a polygon: its unit normal on a side, and its height along it.
+fn plane(geometry: &Geometry, side: Side) -> Option<(Vec3, f32)> {
+    let normal = outward(geometry, side);
+    geometry.is_polygon().then(|| (normal, geometry.point(Vec2::ZERO).dot(normal)))
+}
+
 fn exposed_share(scene: &SceneData, elements: &Elements, leaf: u32) -> f32 {
     let element = &elements.nodes[leaf as usize];
-    if !element.is_patch() || !element.is_flat() || element.importance <= 0.0 {
+    if !element.is_patch() || !element.is_flat() || element.child_count > 0 || element.importance <= 0.0 {
+        return 1.0;
+    }
+    let back = element.kind == Kind::Back;
+    if !elements.is_touched(2 * element.source + u32::from(back)) {
         return 1.0;
     }
     let geometry = &scene.surfaces()[element.source as usize];
-    let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
+    let sign = if back { -1.0 } else { 1.0 };
     let dark = |i: u32, ray: u32| {
         let u = point2(hash(leaf, 0xe7), i);
         let (x, normal, _) = geometry.sample_area(element.domain, u.x, u.y);
-        let n = normal * side;
         let v = point2(hash(leaf, 0xe8), i * RAYS + ray);
-        let direction = cosine_direction(n, v.x, v.y);
-        let hit = scene.visibility.closest_except(x, direction, 0.0, f32::MAX, element.source);
-        hit.is_some_and(|hit| {
-            let material = &scene.materials[scene.surface_materials[hit.surface as usize] as usize];
-            let inside = !material.two_sided && !hit.front;
-            inside || elements.is_sealed(hit.surface, !hit.front)
-        })
+        let direction = cosine_direction(normal * sign, v.x, v.y);
+        let met = scene.visibility.first_side(x, direction, f32::MAX, element.source);
+        met.is_some_and(|(side, _)| is_dark(scene, elements, side))
     };
     if !(0..FIRST_POINTS).any(|i| dark(i, 0)) {
         return 1.0;

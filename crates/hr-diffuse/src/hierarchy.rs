@@ -5,15 +5,17 @@
 //! the parts that refinement makes of it. A two-sided surface has two incident fields, so its front and its back
 //! are two elements. Lights without extent are leaves that only send.
 
+use crate::exposed::is_touched;
 use crate::geometry::{Domain, FACETS, Facet, Geometry};
 use crate::hooks::{FLAT_COSINE, Hierarchy, NodeId};
 use crate::scene::{Light, LightKind};
-use crate::sealed::lit_sides;
+use crate::sealed::{Side, is_back, lit_sides};
 use crate::visibility::Visibility;
 use crate::{Cone, DiffuseMaterial, Facing, Rgb, SurfaceReflectance};
 use glam::{Vec2, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
+use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::ops::Range;
 use std::sync::Arc;
@@ -175,6 +177,8 @@ pub struct Elements {
     pub facets: Vec<[Facet; FACETS]>,
     /// Sides of surfaces left out because no light can reach them: front and back of each.
     sealed: Vec<[bool; 2]>,
+    /// Sides of surfaces that others touch, so that parts of them may be covered.
+    touched: Vec<[bool; 2]>,
     /// By node: see [`exposed`](Self::exposed).
     pub(crate) exposed: Vec<f32>,
 }
@@ -224,6 +228,7 @@ impl Elements {
             surface_nodes: vec![[u32::MAX; 2]; scene.surfaces().len()],
             facets: Vec::new(),
             sealed,
+            touched: Vec::new(),
             exposed: Vec::new(),
         };
         elements.flatten(root);
@@ -233,6 +238,10 @@ impl Elements {
         for node in 0..elements.nodes.len() {
             elements.add_facets(scene, node);
         }
+        let touched = |surface: u32| {
+            [2 * surface, 2 * surface + 1].map(|side| elements.has(side) && is_touched(scene, &elements, side))
+        };
+        elements.touched = (0..scene.surfaces().len() as u32).into_par_iter().with_min_len(64).map(touched).collect();
         elements
     }
 
@@ -243,9 +252,19 @@ impl Elements {
         self.exposed.get(leaf as usize).copied().unwrap_or(1.0)
     }
 
-    /// Whether no light can reach a surface's front or back, which would reflect it.
-    pub(crate) fn is_sealed(&self, surface: u32, back: bool) -> bool {
-        self.sealed[surface as usize][usize::from(back)]
+    /// Whether no light can reach a side, which would reflect it.
+    pub(crate) fn is_sealed(&self, side: Side) -> bool {
+        self.sealed[(side / 2) as usize][usize::from(is_back(side))]
+    }
+
+    /// Whether parts of a side may be covered, by what touches it.
+    pub(crate) fn is_touched(&self, side: Side) -> bool {
+        self.touched[(side / 2) as usize][usize::from(is_back(side))]
+    }
+
+    /// Whether a side has an element.
+    fn has(&self, side: Side) -> bool {
+        self.surface_nodes[(side / 2) as usize][usize::from(is_back(side))] != u32::MAX
     }
 
     /// Sides of surfaces left out because no light can reach them.

@@ -4,25 +4,34 @@
 //! any light stay dark whatever is computed. A large flat side has several spots, for it may be divided by what stands
 //! on it: a floor is lit, but not where a box covers it. Two spots on it belong together if a line just above it, from
 //! one to the other, is free.
+//!
+//! Most sides are known to be lit after a ray or two. Of the others a group shares its rays, however many spots it has:
+//! any one of them that finds light finds it for all. Sides that have the whole scene behind them need none.
 
-use crate::Rgb;
-use crate::geometry::Domain;
+use crate::geometry::{Aabb, Domain, Geometry};
 use crate::hierarchy::SceneData;
 use crate::sampling::{hash, point2, point4};
 use crate::segments::light_segment;
+use crate::visibility::{NO_BLOCKER, Region};
+use crate::{Light, Rgb};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::f32::consts::TAU;
+use std::ops::Range;
 
-/// Rays per spot in successive rounds; only spots of groups that are still dark take part in the next one.
-const ROUNDS: [u32; 4] = [2, 6, 24, 96];
+/// Rays that a group shares in successive rounds; only groups that are still dark take part in the next one, and
+/// emitters.
+const ROUNDS: [u32; 6] = [1, 2, 8, 32, 128, 384];
+/// In rounds with so many rays every spot has one at least.
+const ALL_SPOTS: u32 = 128;
 
-/// Rays that all emitters' spots share, at first.
-const EMITTER_RAYS: u32 = 8192;
-
-/// Rays are confirmed by others that turn away from them by this (radians).
+/// Rays are confirmed by others that turn away from them by this (radians), or where this is less, so much that they
+/// go beside by a share of the radius of what was met.
 const BESIDE: f32 = 2e-3;
+const BESIDE_SHARE: f32 = 0.1;
+/// These meet it at no more than so many times the distance, unless it is seen edge-on.
+const NEARLY: f32 = 1.1;
 
 /// Flat surfaces whose radius in unit space is larger have several spots, so many at first and at most.
 const LARGE: f32 = 0.02;
@@ -32,129 +41,184 @@ const MOST_SPOTS: usize = 64;
 /// How far above a surface lines between its spots run, in unit space.
 const ABOVE: f32 = 1e-3;
 
+/// What rises no more than this above a surface's plane sends it no light worth mentioning.
+const FLUSH: f32 = 1e-5;
+
 /// A point is joined to so many of the spots around it.
 const NEAREST: usize = 6;
+
+/// No spot.
+const NONE: u32 = u32::MAX;
 
 /// A side of a surface: twice the surface's index, plus 1 for the back.
 pub(crate) type Side = u32;
 
+pub(crate) fn is_back(side: Side) -> bool {
+    !side.is_multiple_of(2)
+}
+
 /// For each surface, whether its front and its back may be lit. Where nothing is, everything counts as if it were: there
 /// is no light in the scene. `idle` surfaces hide light, and do nothing else with it.
 ///
-/// A side that sees lit ones in less than about a hundredth of its view may be missed.
+/// A side that sees lit ones in less than about a hundredth of its view, or of that of the group that it belongs to, may
+/// be missed.
 pub(crate) fn lit_sides(scene: &SceneData, idle: &[bool]) -> Vec<[bool; 2]> {
-    let count = scene.surfaces().len();
-    let mut spots = Spots::new(scene);
+    let mut spots = Spots::new(scene, idle);
     // What emitters see is lit; few rays from elsewhere would find a small one.
     let emitters: Vec<u32> = (0..spots.all.len() as u32).filter(|&spot| spots.groups.is_lit(spot)).collect();
-    let rays = (EMITTER_RAYS / emitters.len().max(1) as u32).clamp(16, 256);
-    spots.explore(scene, idle, &emitters, 0..rays);
-    let mut first = rays;
+    let mut first = 0;
     for rays in ROUNDS {
-        let dark: Vec<u32> = (0..spots.all.len() as u32)
-            .filter(|&spot| reflects(scene, idle, spots.all[spot as usize].side) && !spots.groups.is_lit(spot))
-            .collect();
-        spots.explore(scene, idle, &dark, first..first + rays);
+        spots.groups.flatten();
+        let dark = (0..spots.all.len() as u32).filter(|&spot| !spots.groups.is_known_lit(spot));
+        let looking: Vec<u32> = dark.chain(emitters.iter().copied()).collect();
+        if looking.len() == emitters.len() {
+            break;
+        }
+        spots.explore(&looking, first, rays);
         first += rays;
     }
-    let mut is_lit = |side: usize| spots.of_side[side].iter().any(|&spot| spots.groups.is_lit(spot));
-    let lit: Vec<[bool; 2]> = (0..count).map(|surface| [2 * surface, 2 * surface + 1].map(&mut is_lit)).collect();
-    if lit.iter().flatten().any(|lit| *lit) { lit } else { vec![[true; 2]; count] }
+    let mut lit = vec![[false; 2]; scene.surfaces().len()];
+    for spot in 0..spots.all.len() as u32 {
+        let side = spots.all[spot as usize].side;
+        lit[(side / 2) as usize][(side % 2) as usize] |= spots.groups.is_lit(spot);
+    }
+    if lit.iter().flatten().any(|lit| *lit) { lit } else { vec![[true; 2]; lit.len()] }
 }
 
-/// Whether a side does anything with light.
+/// Whether a side does anything with light that falls on it.
 fn reflects(scene: &SceneData, idle: &[bool], side: Side) -> bool {
     let material = &scene.materials[scene.surface_materials[(side / 2) as usize] as usize];
-    !idle[(side / 2) as usize] && (side.is_multiple_of(2) || material.two_sided)
+    !idle[(side / 2) as usize] && (!is_back(side) || material.two_sided)
 }
 
-/// A place on a side, which stands for what is around it.
+/// Whether a side has the whole scene behind it, with all lights.
+fn faces_nothing(scene: &SceneData, side: Side) -> bool {
+    let geometry = &scene.surfaces()[(side / 2) as usize];
+    if !geometry.is_polygon() {
+        return false;
+    }
+    let (x, normal) = (geometry.point(Vec2::ZERO), outward(geometry, side));
+    let above = x.dot(normal) + FLUSH;
+    let bounds = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
+    let region = Region { bounds, normal, heights: [above, f32::INFINITY] };
+    let rises = |surface: u32| scene.surfaces()[surface as usize].heights(normal).is_none_or(|[_, high]| high > above);
+    let unlit = (0..scene.lights.len()).all(|light| light_segment(scene, light, x, normal).1 <= 0.0);
+    unlit && !scene.visibility.any_in(&region, rises)
+}
+
+/// The unit normal of a flat surface on one of its sides.
+pub(crate) fn outward(geometry: &Geometry, side: Side) -> Vec3 {
+    let normal = geometry.normal(Vec2::ZERO);
+    if is_back(side) { -normal } else { normal }
+}
+
+/// A place on a large side, which stands for what is around it; or a whole side.
 struct Spot {
     side: Side,
+    /// On large sides.
     at: Vec3,
-    normal: Vec3,
+    /// The next one on the same side.
+    next: u32,
 }
 
-/// What a spot sees.
+/// What a ray from a spot met.
+enum Met {
+    /// Another spot, or what a line from there reaches.
+    Spot(u32),
+    /// A place on a large side that no spot there is known to belong to.
+    Place(Side, Vec3),
+}
+
+/// A few spots.
+type Spotted = SmallVec<[u32; NEAREST]>;
+
+/// What a spot sees that is not of its group.
+#[derive(Default)]
 struct Seen {
-    met: Vec<Spot>,
+    met: SmallVec<[Met; 1]>,
     /// A light without extent.
     light: bool,
 }
 
-fn look(scene: &SceneData, idle: &[bool], spot: &Spot, seed: u32, rays: std::ops::Range<u32>) -> Seen {
-    let surface = spot.side / 2;
-    let geometry = &scene.surfaces()[surface as usize];
-    let mut seen = Seen { met: Vec::new(), light: false };
-    let whole = !is_large(scene, surface);
-    for i in rays {
-        let u = point4(hash(seed, 0x5ea1), i);
-        let (x, n) = if whole {
-            let (x, normal, _) = geometry.sample_area(Domain::WHOLE, u.x, u.y);
-            (x, if spot.side.is_multiple_of(2) { normal } else { -normal })
-        } else {
-            (spot.at, spot.normal)
-        };
-        let (a, b) = n.any_orthonormal_pair();
-        let direction = cosine_direction(n, u.z, u.w);
-        // Between surfaces that nearly meet single rays slip through: what is seen must be seen a little beside, too.
-        let met = [Vec3::ZERO, a * BESIDE, b * BESIDE]
-            .map(|beside| scene.visibility.closest_except(x, direction + beside, 0.0, f32::MAX, surface));
-        let side = |hit: &crate::Hit| 2 * hit.surface + u32::from(!hit.front);
-        if let [Some(hit), Some(second), Some(third)] = &met
-            && side(hit) == side(second)
-            && side(hit) == side(third)
-            && reflects(scene, idle, side(hit))
-        {
-            let normal = if hit.front { hit.normal } else { -hit.normal };
-            seen.met.push(Spot { side: side(hit), at: hit.point, normal });
-        }
-        seen.light |= sees_light(scene, surface, x, n, |_| true);
-    }
-    seen
-}
-
-/// Whether a surface has several spots.
-fn is_large(scene: &SceneData, surface: u32) -> bool {
-    let geometry = &scene.surfaces()[surface as usize];
-    geometry.is_polygon() && geometry.bounds(Domain::WHOLE).radius() > LARGE
-}
-
 /// All spots, and to what groups rays have joined them.
-struct Spots {
+struct Spots<'a> {
+    scene: &'a SceneData,
     all: Vec<Spot>,
-    of_side: Vec<SmallVec<[u32; 4]>>,
+    /// The spot of each side that was added last; [`NONE`] on sides that do nothing with light or that none can reach.
+    of_side: Vec<u32>,
+    /// Surfaces whose sides have several spots.
+    large: Vec<bool>,
     groups: Groups,
 }
 
-impl Spots {
-    fn new(scene: &SceneData) -> Self {
+impl<'a> Spots<'a> {
+    fn new(scene: &'a SceneData, idle: &[bool]) -> Self {
         let count = scene.surfaces().len();
-        let mut spots = Self { all: Vec::new(), of_side: vec![SmallVec::new(); 2 * count], groups: Groups::default() };
-        for surface in 0..count as u32 {
-            let geometry = &scene.surfaces()[surface as usize];
-            let emits = scene.materials[scene.surface_materials[surface as usize] as usize].exitance != Rgb::ZERO;
-            let places = if is_large(scene, surface) { FIRST_SPOTS } else { 1 };
-            for side in [2 * surface, 2 * surface + 1] {
-                for place in 0..places {
-                    let u: Vec2 = point2(hash(side, 0x59), place);
-                    let (at, normal, _) = geometry.sample_area(Domain::WHOLE, u.x, u.y);
-                    let normal = if side.is_multiple_of(2) { normal } else { -normal };
-                    let spot = spots.add(Spot { side, at, normal }, emits && side.is_multiple_of(2));
-                    spots.connect(scene, spot);
-                }
+        let is_large = |geometry: &Geometry| geometry.is_polygon() && geometry.bounds(Domain::WHOLE).radius() > LARGE;
+        let mut spots = Self {
+            scene,
+            all: Vec::with_capacity(count),
+            of_side: vec![NONE; 2 * count],
+            large: scene.surfaces().par_iter().map(is_large).collect(),
+            groups: Groups::default(),
+        };
+        let emits = |side: Side| {
+            let material = scene.surface_materials[(side / 2) as usize];
+            !is_back(side) && scene.materials[material as usize].exitance != Rgb::ZERO
+        };
+        let takes_part = |&side: &Side| reflects(scene, idle, side) && (emits(side) || !faces_nothing(scene, side));
+        let sides: Vec<Side> = (0..2 * count as u32).into_par_iter().filter(takes_part).collect();
+        for side in sides {
+            if !spots.large[(side / 2) as usize] {
+                spots.add(side, Vec3::ZERO, emits(side));
+                continue;
+            }
+            for place in 0..FIRST_SPOTS {
+                let u: Vec2 = point2(hash(side, 0x59), place);
+                let (at, _, _) = scene.surfaces()[(side / 2) as usize].sample_area(Domain::WHOLE, u.x, u.y);
+                let spot = spots.add(side, at, emits(side));
+                spots.join_around(spot, side, at);
             }
         }
         spots
     }
 
-    /// Joins spots to what rays from them meet.
-    fn explore(&mut self, scene: &SceneData, idle: &[bool], spots: &[u32], rays: std::ops::Range<u32>) {
-        let look = |&spot: &u32| look(scene, idle, &self.all[spot as usize], spot, rays.clone());
-        let seen: Vec<Seen> = spots.par_iter().map(look).collect();
-        for (&spot, seen) in spots.iter().zip(&seen) {
+    fn add(&mut self, side: Side, at: Vec3, lit: bool) -> u32 {
+        let id = self.groups.add(lit);
+        self.all.push(Spot { side, at, next: self.of_side[side as usize] });
+        self.of_side[side as usize] = id;
+        id
+    }
+
+    /// Joins spots to what rays from them meet; those of a group share `rays`, of which `first` were shot before.
+    fn explore(&mut self, looking: &[u32], first: u32, rays: u32) {
+        let mut sharing = vec![0_u32; self.all.len()];
+        for &spot in looking {
+            sharing[self.groups.known_root(spot)] += 1;
+        }
+        let mut passed = vec![0_u32; self.all.len()];
+        let takes_turn = |&spot: &u32| {
+            let root = self.groups.known_root(spot);
+            passed[root] += 1;
+            rays >= ALL_SPOTS || passed[root].is_multiple_of(sharing[root].div_ceil(rays))
+        };
+        let looking: Vec<u32> = looking.iter().copied().filter(takes_turn).collect();
+        let look = |&spot: &u32| {
+            let share = rays / sharing[self.groups.known_root(spot)];
+            self.look(spot, first..first + share.max(1))
+        };
+        let seen: Vec<Seen> = looking.par_iter().with_min_len(16).map(look).collect();
+        for (&spot, seen) in looking.iter().zip(&seen) {
             for met in &seen.met {
-                self.join(scene, spot, met);
+                match *met {
+                    Met::Spot(other) => self.groups.join(spot, other),
+                    Met::Place(side, at) => {
+                        if !self.join_around(spot, side, at) && self.on_side(side).count() < MOST_SPOTS {
+                            let other = self.add(side, at, false);
+                            self.groups.join(spot, other);
+                        }
+                    }
+                }
             }
             if seen.light {
                 self.groups.light(spot);
@@ -162,54 +226,99 @@ impl Spots {
         }
     }
 
-    fn add(&mut self, spot: Spot, lit: bool) -> u32 {
-        let id = self.groups.add(lit);
-        self.of_side[spot.side as usize].push(id);
-        self.all.push(spot);
-        id
+    /// What rays from a spot meet, until it is known to be lit.
+    fn look(&self, spot: u32, rays: Range<u32>) -> Seen {
+        let Spot { side, at, .. } = self.all[spot as usize];
+        let (scene, surface) = (self.scene, side / 2);
+        let geometry = &scene.surfaces()[surface as usize];
+        let searching = !self.groups.is_known_lit(spot);
+        let mut seen = Seen::default();
+        for i in rays {
+            let u = point4(hash(spot, 0x5ea1), i);
+            let (x, n) = if self.large[surface as usize] {
+                (at, outward(geometry, side))
+            } else {
+                let (x, normal, _) = geometry.sample_area(Domain::WHOLE, u.x, u.y);
+                (x, if is_back(side) { -normal } else { normal })
+            };
+            seen.light |= searching && sees_light(scene, surface, x, n, |_| true);
+            let mut lit = seen.light;
+            if let Some(met) = self.meet(spot, x, n, cosine_direction(n, u.z, u.w)) {
+                lit |= matches!(met, Met::Spot(other) if self.groups.is_known_lit(other));
+                seen.met.push(met);
+            }
+            if searching && lit {
+                break;
+            }
+        }
+        seen
     }
 
-    /// Joins a spot to what a ray from it met.
-    fn join(&mut self, scene: &SceneData, spot: u32, met: &Spot) {
-        let there = &self.of_side[met.side as usize];
-        if !is_large(scene, met.side / 2) {
-            let other = there[0];
-            self.groups.join(spot, other);
-            return;
-        }
-        let around = self.reached(scene, met);
-        if around.is_empty() && there.len() < MOST_SPOTS {
-            let other = self.add(Spot { side: met.side, at: met.at, normal: met.normal }, false);
-            self.groups.join(spot, other);
-        }
-        for other in around {
-            self.groups.join(spot, other);
-        }
-    }
-
-    /// Joins a new spot to the others on its side.
-    fn connect(&mut self, scene: &SceneData, spot: u32) {
-        let Spot { side, at, normal } = self.all[spot as usize];
-        for other in self.reached(scene, &Spot { side, at, normal }) {
-            self.groups.join(spot, other);
-        }
-    }
-
-    /// Of the spots nearest to a place on a large flat side those that a line just above it reaches.
-    fn reached(&self, scene: &SceneData, place: &Spot) -> SmallVec<[u32; NEAREST]> {
-        let mut there: SmallVec<[(f32, u32); 64]> = self.of_side[place.side as usize]
-            .iter()
-            .map(|&spot| (self.all[spot as usize].at.distance_squared(place.at), spot))
-            .collect();
-        there.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        let lift = place.normal * ABOVE;
-        let own = place.side / 2;
-        let mut blocker = u32::MAX;
-        let mut free = |&(_, spot): &(f32, u32)| {
-            let to = self.all[spot as usize].at;
-            !scene.visibility.occluded(place.at + lift, to + lift, [own, own], &mut blocker)
+    /// What a ray from a spot meets that is not known to be of its group.
+    fn meet(&self, spot: u32, x: Vec3, n: Vec3, direction: Vec3) -> Option<Met> {
+        let visibility = &self.scene.visibility;
+        let own = self.all[spot as usize].side / 2;
+        let (side, t) = visibility.first_side(x, direction, f32::MAX, own)?;
+        let met = self.around(spot, side, x + direction * t)?;
+        // Between surfaces that nearly meet single rays slip through: what is seen must be seen a little beside, too.
+        let radius = visibility.geometries()[(side / 2) as usize].bounds(Domain::WHOLE).radius();
+        let turn = BESIDE.min(BESIDE_SHARE * radius / t);
+        let (a, b) = n.any_orthonormal_pair();
+        let also = |aside: Vec3| {
+            let met = visibility.first_side(x, direction + aside * turn, NEARLY * t, own);
+            met.is_some_and(|met| met.0 == side)
         };
-        there.iter().take(NEAREST).filter(|near| free(near)).map(|&(_, spot)| spot).collect()
+        (also(a) && also(b)).then_some(met)
+    }
+
+    /// What a spot may be joined to that sees a place on a side; `None` where that is of its group as far as is known.
+    fn around(&self, spot: u32, side: Side, at: Vec3) -> Option<Met> {
+        let root = self.groups.known_root(spot);
+        if !self.large[(side / 2) as usize] {
+            let other = self.of_side[side as usize];
+            return (other != NONE && self.groups.known_root(other) != root).then_some(Met::Spot(other));
+        }
+        let near = self.nearest(side, at);
+        let known = |other: u32| self.groups.known_root(other) == root;
+        match near.iter().find(|&&other| !known(other) && self.is_joined(side, at, other)) {
+            Some(&other) => Some(Met::Spot(other)),
+            None => (!near.is_empty() && !near.iter().any(|&other| known(other))).then_some(Met::Place(side, at)),
+        }
+    }
+
+    /// Joins a spot to those around a place that it sees; tells whether there are any, or that it belongs to already.
+    fn join_around(&mut self, spot: u32, side: Side, at: Vec3) -> bool {
+        let mut joined = false;
+        for other in self.nearest(side, at) {
+            if self.groups.root(other) == self.groups.root(spot) || self.is_joined(side, at, other) {
+                self.groups.join(spot, other);
+                joined = true;
+            }
+        }
+        joined
+    }
+
+    /// Whether a line just above a large flat side leads from a place on it to a spot.
+    fn is_joined(&self, side: Side, at: Vec3, spot: u32) -> bool {
+        let own = side / 2;
+        let lift = outward(&self.scene.surfaces()[own as usize], side) * ABOVE;
+        let to = self.all[spot as usize].at;
+        !self.scene.visibility.occluded(at + lift, to + lift, [own, own], &mut { NO_BLOCKER })
+    }
+
+    /// The spots of a side that are nearest to a place on it, the nearest first.
+    fn nearest(&self, side: Side, at: Vec3) -> Spotted {
+        let distance = |spot: u32| self.all[spot as usize].at.distance_squared(at);
+        let mut there: SmallVec<[(f32, u32); MOST_SPOTS]> =
+            self.on_side(side).map(|spot| (distance(spot), spot)).collect();
+        there.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        there.into_iter().take(NEAREST).map(|(_, spot)| spot).collect()
+    }
+
+    /// The spots of a side.
+    fn on_side(&self, side: Side) -> impl Iterator<Item = u32> {
+        let known = |spot: u32| (spot != NONE).then_some(spot);
+        std::iter::successors(known(self.of_side[side as usize]), move |&spot| known(self.all[spot as usize].next))
     }
 }
 
@@ -221,13 +330,7 @@ pub(crate) fn cosine_direction(n: Vec3, u: f32, v: f32) -> Vec3 {
 }
 
 /// Whether a point of a surface with normal `n` sees one of those lights without extent that are `wanted`.
-pub(crate) fn sees_light(
-    scene: &SceneData,
-    surface: u32,
-    x: Vec3,
-    n: Vec3,
-    wanted: impl Fn(&crate::Light) -> bool,
-) -> bool {
+pub(crate) fn sees_light(scene: &SceneData, surface: u32, x: Vec3, n: Vec3, wanted: impl Fn(&Light) -> bool) -> bool {
     let mut blocker = u32::MAX;
     scene.lights.iter().enumerate().filter(|(_, light)| wanted(light)).any(|(light, _)| {
         let (to, cosine) = light_segment(scene, light, x, n);
@@ -266,6 +369,22 @@ impl Groups {
     pub(crate) fn is_lit(&mut self, member: u32) -> bool {
         let root = self.root(member);
         self.lit[root]
+    }
+
+    /// Makes all members point to their roots, for [`known_root`](Self::known_root).
+    fn flatten(&mut self) {
+        for member in 0..self.parent.len() as u32 {
+            self.parent[member as usize] = self.root(member) as u32;
+        }
+    }
+
+    /// The root as it was when all were flattened.
+    fn known_root(&self, member: u32) -> usize {
+        self.parent[member as usize] as usize
+    }
+
+    fn is_known_lit(&self, member: u32) -> bool {
+        self.lit[self.known_root(member)]
     }
 
     pub(crate) fn light(&mut self, member: u32) {

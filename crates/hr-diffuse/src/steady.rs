@@ -25,14 +25,23 @@ const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 /// Refuses scenes whose light has no end. `extra` is what an extension reflects of a material beside the diffuse part.
 pub(crate) fn check(scene: &SceneData, extra: impl Fn(u32) -> Rgb) -> Result<(), SolveError> {
+    let extra: Vec<Rgb> = (0..scene.materials.len() as u32).map(extra).collect();
+    if scene.texture.is_none()
+        && extra.iter().zip(&scene.materials).all(|(e, m)| (*e + m.reflectance).max_element() <= ENTIRE)
+    {
+        return Ok(());
+    }
     let count = scene.surfaces().len() as u32;
+    let albedo = |surface: u32| {
+        let other = extra[scene.surface_materials[surface as usize] as usize];
+        if scene.is_twin(surface) { Rgb::ZERO } else { scene.reflectance(surface, &Domain::WHOLE) + other }
+    };
+    let albedos: Vec<Rgb> = (0..count).into_par_iter().map(albedo).collect();
     for (channel, name) in CHANNELS.into_iter().enumerate() {
         let entire: Vec<bool> = (0..2 * count)
             .map(|side| {
-                let material = scene.surface_materials[(side / 2) as usize];
-                let reflects = side % 2 == 0 || scene.materials[material as usize].two_sided;
-                let albedo = scene.reflectance(side / 2, &Domain::WHOLE) + extra(material);
-                reflects && !scene.is_twin(side / 2) && albedo[channel] > ENTIRE
+                let material = &scene.materials[scene.surface_materials[(side / 2) as usize] as usize];
+                (side % 2 == 0 || material.two_sided) && albedos[(side / 2) as usize][channel] > ENTIRE
             })
             .collect();
         let sides: Vec<Side> = (0..2 * count).filter(|&side| entire[side as usize]).collect();
@@ -85,10 +94,8 @@ fn look(scene: &SceneData, entire: &[bool], side: Side, rays: u32, channel: usiz
         let (x, normal, _) = scene.surfaces()[surface as usize].sample_area(Domain::WHOLE, u.x, u.y);
         let n = if back { -normal } else { normal };
         let direction = cosine_direction(n, u.z, u.w);
-        match scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface) {
-            Some(hit) if entire[(2 * hit.surface + u32::from(!hit.front)) as usize] => {
-                seen.sides.push(2 * hit.surface + u32::from(!hit.front));
-            }
+        match scene.visibility.first_side(x, direction, f32::MAX, surface) {
+            Some((other, _)) if entire[other as usize] => seen.sides.push(other),
             _ => {
                 seen.leaks = true;
                 break;

@@ -4,14 +4,15 @@
 //! hold the outlines of polygons, which is all that a test needs; curved surfaces are tested in f64 through their
 //! [`Geometry`]. No ray allocates, and every query is a pure function: results do not depend on the thread.
 
-use crate::geometry::{Aabb, Geometry, Outline};
+use crate::geometry::{Aabb, Domain, Geometry, Outline};
+use crate::sealed::Side;
 use glam::{Vec2, Vec3, Vec3A, Vec4};
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use obvhs::{Boundable, BvhBuildParams};
+use rayon::prelude::*;
 use smallvec::SmallVec;
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// What an end of a segment may touch without being blocked, in unit space: surfaces that abut there. Positions are
@@ -80,6 +81,13 @@ struct Leaf {
 enum Primitive {
     Polygon(Outline),
     Curved,
+}
+
+/// Part of space: a box, between two heights along a unit normal.
+pub(crate) struct Region {
+    pub(crate) bounds: Aabb,
+    pub(crate) normal: Vec3,
+    pub(crate) heights: [f32; 2],
 }
 
 /// A ray with what slab tests need.
@@ -260,6 +268,25 @@ impl Visibility {
     /// one not within the distance that rounding explains.
     #[must_use]
     pub fn closest_except(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, own: u32) -> Option<Hit> {
+        let (t, surface) = self.nearest(origin, direction, t_min, t_max, own)?;
+        let geometry = &self.geometries[surface as usize];
+        let uv = geometry.parameters_of(origin + direction * t);
+        let normal = geometry.normal(uv);
+        Some(Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 })
+    }
+
+    /// The side that a ray from the surface `own` meets first, with t < `t_max`, and at which t, in multiples of its
+    /// direction.
+    pub(crate) fn first_side(&self, origin: Vec3, direction: Vec3, t_max: f32, own: u32) -> Option<(Side, f32)> {
+        let (t, surface) = self.nearest(origin, direction, 0.0, t_max, own)?;
+        let geometry = &self.geometries[surface as usize];
+        // Where the normal is the same everywhere, the place on the surface need not be found.
+        let uv = if geometry.is_flat() { Vec2::ZERO } else { geometry.parameters_of(origin + direction * t) };
+        Some((2 * surface + u32::from(geometry.normal(uv).dot(direction) >= 0.0), t))
+    }
+
+    /// Distance and surface of the hit that [`closest_except`](Self::closest_except) tells more about.
+    fn nearest(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, own: u32) -> Option<(f32, u32)> {
         let length = direction.length();
         if !(length > 0.0 && length.is_finite() && origin.is_finite()) || self.nodes.is_empty() {
             return None;
@@ -279,9 +306,13 @@ impl Visibility {
                 while mask != 0 {
                     let child = mask.trailing_zeros() as usize & 3;
                     mask &= mask - 1;
+                    stack.push((node.children[child], near[child]));
                     // The nearest last, to be popped first.
-                    let at = stack[base..].iter().position(|&(_, t)| t < near[child]).unwrap_or(stack.len() - base);
-                    stack.insert(base + at, (node.children[child], near[child]));
+                    let mut at = stack.len() - 1;
+                    while at > base && stack[at - 1].1 < stack[at].1 {
+                        stack.swap(at - 1, at);
+                        at -= 1;
+                    }
                 }
                 continue;
             }
@@ -306,11 +337,40 @@ impl Visibility {
                 }
             }
         }
-        let (t, surface) = (best.0, best.1?);
-        let geometry = &self.geometries[surface as usize];
-        let uv = geometry.parameters_of(origin + direction * t);
-        let normal = geometry.normal(uv);
-        Some(Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 })
+        best.1.map(|surface| (best.0, surface))
+    }
+
+    /// Whether any surface whose box, about, reaches into a region is `wanted`.
+    pub(crate) fn any_in(&self, region: &Region, wanted: impl Fn(u32) -> bool) -> bool {
+        let [low, high] = [region.bounds.min, region.bounds.max].map(|p| p.to_array().map(Vec4::splat));
+        let normal = region.normal.to_array().map(Vec4::splat);
+        let [least, most] = region.heights.map(Vec4::splat);
+        // Indices of the bounds that lie lowest along the normal.
+        let lowest = [0, 1, 2].map(|axis| 2 * axis + usize::from(region.normal[axis] < 0.0));
+        let mut stack: SmallVec<[u32; 64]> = SmallVec::new();
+        if !self.nodes.is_empty() {
+            stack.push(0);
+        }
+        while let Some(index) = stack.pop() {
+            if index & LEAF == 0 {
+                let Node { bounds, children } = &self.nodes[index as usize];
+                let overlap = |axis: usize| bounds[2 * axis].cmple(high[axis]) & bounds[2 * axis + 1].cmpge(low[axis]);
+                let height =
+                    |[x, y, z]: [usize; 3]| normal[0] * bounds[x] + normal[1] * bounds[y] + normal[2] * bounds[z];
+                let between = height(lowest).cmple(most) & height(lowest.map(|i| i ^ 1)).cmpge(least);
+                let mut mask = (overlap(0) & overlap(1) & overlap(2) & between).bitmask();
+                while mask != 0 {
+                    stack.push(children[mask.trailing_zeros() as usize & 3]);
+                    mask &= mask - 1;
+                }
+                continue;
+            }
+            let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
+            if self.surfaces[first as usize..(first + count) as usize].iter().any(|&surface| wanted(surface)) {
+                return true;
+            }
+        }
+        false
     }
 
     /// Turns the binary tree into nodes of four children, parents before children.
@@ -394,17 +454,18 @@ impl Boundable for GroupBox {
 impl Groups {
     fn new(geometries: &[Geometry], first: &[u32]) -> Self {
         // In order of the boxes' bits: no hashing, thus the same tree every time.
-        let mut groups: BTreeMap<[u32; 6], (Aabb, Vec<u32>)> = BTreeMap::new();
-        for (surface, geometry) in geometries.iter().enumerate().filter(|(i, _)| first[*i] as usize == *i) {
-            let bounds = geometry.bounds(crate::geometry::Domain::WHOLE);
-            let [a, b, c] = bounds.min.to_array().map(f32::to_bits);
-            let [d, e, f] = bounds.max.to_array().map(f32::to_bits);
-            groups.entry([a, b, c, d, e, f]).or_insert((bounds, Vec::new())).1.push(surface as u32);
-        }
-        let mut result = Self { boxes: Vec::new(), surfaces: Vec::new(), starts: vec![0] };
-        for (bounds, members) in groups.into_values() {
-            result.boxes.push(GroupBox(bounds));
-            result.surfaces.extend(members);
+        let bounds = |surface: u32| {
+            let bounds = geometries[surface as usize].bounds(Domain::WHOLE);
+            ([bounds.min, bounds.max].map(|p| p.to_array().map(f32::to_bits)), surface)
+        };
+        let own = (0..geometries.len() as u32).into_par_iter().filter(|&surface| first[surface as usize] == surface);
+        let mut sorted: Vec<([[u32; 3]; 2], u32)> = own.map(bounds).collect();
+        sorted.par_sort_unstable();
+        let mut result = Self { boxes: Vec::new(), surfaces: Vec::with_capacity(sorted.len()), starts: vec![0] };
+        for group in sorted.chunk_by(|a, b| a.0 == b.0) {
+            let [min, max] = group[0].0.map(|bits| Vec3::from_array(bits.map(f32::from_bits)));
+            result.boxes.push(GroupBox(Aabb { min, max }));
+            result.surfaces.extend(group.iter().map(|&(_, surface)| surface));
             result.starts.push(result.surfaces.len());
         }
         result
@@ -421,7 +482,7 @@ impl Groups {
             // Above 0 the lowest levels are paired hastily, which costs large scenes a factor in every ray.
             search_depth_threshold: 0,
             reinsertion_batch_ratio: 0.2,
-            post_collapse_reinsertion_batch_ratio_multiplier: 2.0,
+            post_collapse_reinsertion_batch_ratio_multiplier: 1.0,
             sort_precision: SortPrecision::U64,
             max_prims_per_leaf: 4,
             collapse_traversal_cost: 1.5,

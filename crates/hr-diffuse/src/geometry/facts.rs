@@ -29,6 +29,19 @@ impl Geometry {
         matches!(self, Self::Triangle(_) | Self::Quad(_))
     }
 
+    /// The least and the greatest coordinate of a polygon's corners along a direction; `None` for other surfaces.
+    pub(crate) fn heights(&self, direction: Vec3) -> Option<[f32; 2]> {
+        let of = |points: &[Vec3]| {
+            let each = points.iter().map(|p| p.dot(direction));
+            each.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], height| [low.min(height), high.max(height)])
+        };
+        match self {
+            Self::Triangle(triangle) => Some(of(triangle.points())),
+            Self::Quad(quad) => Some(of(quad.points())),
+            Self::Revolution(_) => None,
+        }
+    }
+
     /// Centre and radius, if it is a sphere.
     #[must_use]
     pub fn sphere(&self) -> Option<(Vec3, f32)> {
