@@ -150,7 +150,7 @@ fn random_scenes_are_refused_or_solved() {
     let mut solved = 0;
     for case in 0..cases() {
         let mut source = Source::new(0xa11, case);
-        let settings = Settings { error: source.of(&[1.0, 0.5, 0.2, 0.05]) };
+        let settings = Settings::with_error(source.of(&[1.0, 0.5, 0.2, 0.05]));
         let Some((input, mut solver)) = mended(source.scene(), settings) else { continue };
         let mut calls = 0;
         let mut watch = |_: &Progress| {
@@ -176,7 +176,7 @@ fn random_scenes_do_not_make_light() {
         for material in &mut input.materials {
             material.reflectance *= 0.5;
         }
-        let Some((input, mut solver)) = mended(input, Settings { error: 0.5 }) else { continue };
+        let Some((input, mut solver)) = mended(input, Settings::with_error(0.5)) else { continue };
         let mut calls = 0;
         let mut watch = |_: &Progress| {
             calls += 1;

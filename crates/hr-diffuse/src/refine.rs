@@ -5,6 +5,7 @@
 //! not depend on the number of threads.
 
 use crate::Rgb;
+use crate::budget::{Account, Growth, Spent};
 use crate::form_factor::{self, Accuracy, Part};
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
@@ -76,6 +77,18 @@ enum Verdict {
     SplitBoth,
 }
 
+impl Verdict {
+    /// The nodes of a pair that are to be split.
+    fn split(&self, pair: Pair) -> SmallVec<[u32; 2]> {
+        match self {
+            Self::SplitReceiver => smallvec![pair.receiver],
+            Self::SplitSender => smallvec![pair.sender],
+            Self::SplitBoth => smallvec![pair.receiver, pair.sender],
+            _ => SmallVec::new(),
+        }
+    }
+}
+
 /// What a refinement made.
 #[derive(Debug, Default)]
 pub(crate) struct Refined {
@@ -86,6 +99,7 @@ pub(crate) struct Refined {
     pub(crate) rays: u64,
     pub(crate) visibility_seconds: f64,
     pub(crate) stopped: bool,
+    pub(crate) spent: Option<Spent>,
     pub(crate) changed: bool,
 }
 
@@ -112,13 +126,14 @@ impl Candidate {
 }
 
 /// Refines `links` and `unlit` pairs until each is within tolerance. `watch` is asked every few milliseconds with the
-/// number of pairs in a wave and of links; once it breaks, pairs keep the link that they come from, or are linked as
+/// number of pairs in a wave and of links; once it breaks, or a budget is spent, pairs keep the link that they come from, or are linked as
 /// they are.
 pub(crate) fn refine<L: LightField>(
     light: &mut MutableLight<'_, L>,
     links: Vec<Link>,
     unlit: Vec<Pair>,
     tolerance: Tolerance,
+    account: &Account,
     watch: &mut dyn FnMut(u64, u64) -> ControlFlow<()>,
 ) -> Refined {
     let mut refined = Refined::default();
@@ -132,15 +147,28 @@ pub(crate) fn refine<L: LightField>(
         refined.pairs += wave.len() as u64;
         let reader = light.read();
         let mut verdicts: Vec<Verdict> = Vec::with_capacity(wave.len());
-        for part in wave.chunks(BETWEEN_WATCHES * rayon::current_num_threads()) {
+        let mut growth = Growth::new(reader.elements, refined.links.len() + wave.len());
+        while verdicts.len() < wave.len() {
+            let first = verdicts.len();
+            let part = &wave[first..wave.len().min(first + BETWEEN_WATCHES * rayon::current_num_threads())];
             refined.stopped = refined.stopped || watch(wave.len() as u64, refined.links.len() as u64).is_break();
-            let stopped = refined.stopped;
+            refined.spent = refined.spent.or(account.is_late().then_some(Spent::Time));
+            let stopped = refined.stopped || refined.spent.is_some();
             let decided = part.par_iter().with_min_len(32).map(|candidate| {
                 let inherited = if stopped { inherited(reader, candidate) } else { None };
                 let decided = || decide(reader, candidate.pair, candidate.own(), tolerance, stopped, &counters);
                 inherited.map_or_else(decided, Verdict::Keep)
             });
             verdicts.par_extend(decided);
+            // Pair by pair: where memory ends does not depend on the number of threads.
+            let full = (first..verdicts.len()).find(|&i| {
+                growth.add(reader.elements, &verdicts[i].split(wave[i].pair));
+                !stopped && account.is_full::<L>(growth.nodes, growth.links)
+            });
+            if let Some(last) = full {
+                refined.spent = Some(Spent::Memory);
+                verdicts.truncate(last + 1);
+            }
         }
         split_elements(light, &wave, &verdicts);
         let elements = &*light.elements;
@@ -210,13 +238,7 @@ impl<L: LightField> MutableLight<'_, L> {
 
 fn split_elements<L: LightField>(light: &mut MutableLight<'_, L>, wave: &[Candidate], verdicts: &[Verdict]) {
     for (Candidate { pair, .. }, verdict) in wave.iter().zip(verdicts) {
-        let nodes: SmallVec<[u32; 2]> = match verdict {
-            Verdict::SplitReceiver => smallvec![pair.receiver],
-            Verdict::SplitSender => smallvec![pair.sender],
-            Verdict::SplitBoth => smallvec![pair.receiver, pair.sender],
-            _ => continue,
-        };
-        for node in nodes {
+        for node in verdict.split(*pair) {
             light.elements.split(light.scene, node);
             let (scene, exitant) = (light.scene, &mut *light.exitant);
             for child in exitant.radiosity.len()..light.elements.nodes.len() {

@@ -1,5 +1,6 @@
 //! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
 
+use crate::budget::{Account, Budget};
 use crate::columns::{FREELY, STRICTLY, gains};
 use crate::convergence::Convergence;
 use crate::error::SolveError;
@@ -53,11 +54,21 @@ const FAINT_CHANNEL: f64 = 1e-3;
 pub struct Settings {
     /// Relative error of the solution, 0.001…1: 0.02 is fine, 0.1 coarse.
     pub error: f32,
+    /// What it may cost.
+    pub budget: Budget,
+}
+
+impl Settings {
+    /// An error asked for, whatever it costs.
+    #[must_use]
+    pub fn with_error(error: f32) -> Self {
+        Self { error, budget: Budget::default() }
+    }
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { error: 0.05 }
+        Self::with_error(0.05)
     }
 }
 
@@ -100,6 +111,7 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) reflected: Vec<L::Exitant>,
     pub(crate) settings: Settings,
     pub(crate) stats: Stats,
+    account: Account,
     unlit: Vec<Pair>,
     /// Irradiance through a node's own links, on flat nodes.
     own: Vec<Gathered>,
@@ -168,6 +180,7 @@ impl<L: LightField> Solver<L> {
             reflected: std::iter::repeat_with(L::Exitant::default).take(count).collect(),
             settings,
             stats: Stats { polygons: input.surfaces.len() as u64, ..Stats::default() },
+            account: Account::new(settings.budget, start),
             unlit: vec![Pair { receiver: 0, sender: 0 }],
             own: Vec::new(),
             transfers: Vec::new(),
@@ -188,25 +201,26 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Solves. `watch` is told how far it is every few milliseconds, and may break: then the solution is what there is by
-    /// then, and [`Stats::stopped`] is set. Budgets of time and memory are its business: a link takes 16 bytes, an
-    /// element about 400 and what the extension keeps of it.
+    /// then, and [`Stats::stopped`] is set. Where a [`Budget`] is spent, light settles over what is linked by then, and
+    /// [`Stats::spent`] tells which one it was.
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
         for (pass, looseness) in PASSES.iter().chain(std::iter::repeat(&1.0)).enumerate().take(PASSES.len() + 1) {
-            let last = pass + 1 >= PASSES.len();
             let changed = self.refine(pass, *looseness, &mut stopped, watch);
+            let last = pass + 1 >= PASSES.len();
             let goal = if last { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
             let most = if last { MOST_ITERATIONS } else { 3 };
             if stopped {
                 // New elements have their parents' light.
                 break;
             }
+            let account = self.account;
             for iteration in 0..most {
                 let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
                 let progress = self.progress(Phase::Transport, fraction, *looseness);
                 let ask = &mut || {
                     stopped = stopped || watch(&progress).is_break();
-                    if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                    if stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
                 };
                 // Once the light is there, and what is linked is fine enough.
                 let places = last && iteration == if pass < PASSES.len() { 1 } else { 0 };
@@ -221,7 +235,8 @@ impl<L: LightField> Solver<L> {
                     break;
                 }
             }
-            if stopped || last && !changed {
+            self.measure();
+            if stopped || account.is_over() || last && !changed {
                 break;
             }
         }
@@ -229,10 +244,17 @@ impl<L: LightField> Solver<L> {
             // Whenever it was stopped, there is some light.
             self.iterate(false, &mut || ControlFlow::Continue(()));
         }
+        self.measure();
         self.stats.stopped = stopped;
         self.stats.nodes = self.elements.nodes.len() as u64;
         self.stats.leaves = self.elements.patch_leaves().count() as u64;
         self.stats.links = self.links.all().len() as u64;
+    }
+
+    /// Takes note of the memory in use.
+    fn measure(&mut self) {
+        let links = self.links.all().len() as u64;
+        self.stats.bytes = self.account.measure(&self.field, &self.incident, &self.reflected, links);
     }
 
     /// Refines all links to a tolerance; tells whether any pair was split.
@@ -262,12 +284,13 @@ impl<L: LightField> Solver<L> {
             faint: &self.faint,
         };
         let mut wave_number = 0.0_f32;
-        let refined = refine(&mut light, links, unlit, tolerance, &mut |wave, done| {
+        let refined = refine(&mut light, links, unlit, tolerance, &self.account, &mut |wave, done| {
             wave_number += 1.0;
             let fraction = progress_fraction(pass, 0.8 * wave_number / (wave_number + 8.0));
             watch(&Progress { phase: Phase::Refine, fraction, error, links: wave + done, nodes })
         });
         *stopped |= refined.stopped;
+        self.stats.spent = self.stats.spent.or(refined.spent);
         let count = self.elements.nodes.len();
         self.links = Links::new(refined.links, count);
         self.unlit = refined.unlit;
