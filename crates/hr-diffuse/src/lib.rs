@@ -28,6 +28,7 @@ pub mod sampling;
 pub mod scene;
 mod sealed;
 mod segments;
+mod skips;
 pub mod solution;
 pub mod solver;
 pub mod stats;

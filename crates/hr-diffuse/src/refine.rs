@@ -12,6 +12,7 @@ use crate::hooks::LightField;
 use crate::links::Link;
 use crate::oracle::{FactorBounds, factor_bounds};
 use crate::segments;
+use crate::skips::Skips;
 use crate::stats::Skipped;
 use crate::transport::{Exitant, Light};
 use glam::{DVec3, Vec3};
@@ -64,6 +65,8 @@ pub(crate) struct Tolerance {
     pub(crate) area: f32,
     /// Radius in unit space below which elements are not split.
     pub(crate) smallest: f32,
+    /// Pairs that need no link.
+    pub(crate) skips: Skips,
 }
 
 /// What becomes of a pair.
@@ -326,10 +329,11 @@ fn decide<L: LightField>(
     counters: &Counters,
 ) -> Verdict {
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
-    if r.importance <= 0.0 || r.kind == Kind::Light {
+    let skips = tolerance.skips;
+    if skips.black_receivers && r.importance <= 0.0 || r.kind == Kind::Light {
         return Verdict::Black;
     }
-    if r.is_patch() && s.is_patch() && r.source == s.source && r.convex && r.kind == s.kind {
+    if skips.facing && r.is_patch() && s.is_patch() && r.source == s.source && r.convex && r.kind == s.kind {
         return Verdict::Facing;
     }
     let own = pair.receiver == pair.sender;
@@ -339,13 +343,20 @@ fn decide<L: LightField>(
     if own {
         return split_self(light, pair.receiver, tolerance, stopped);
     }
-    let Some(bounds) = factor_bounds(light.scene, r, s) else { return Verdict::Facing };
+    let Some(bounds) = factor_bounds(light.scene, r, s).or_else(|| (!skips.facing).then_some(FactorBounds::NONE))
+    else {
+        return Verdict::Facing;
+    };
     let weight = r.importance * (r.area / tolerance.area).sqrt();
     let interval = interval(light, pair.sender, &bounds, tolerance.error / weight);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
     let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);
-    if touching && !(r.is_flat() && s.is_flat()) && !segments::any_facing(light, pair.receiver, pair.sender, PROBES) {
+    if skips.facing
+        && touching
+        && (r.kind == Kind::Cluster || s.kind == Kind::Cluster)
+        && !segments::any_facing(light, pair.receiver, pair.sender, PROBES)
+    {
         return Verdict::Facing;
     }
     // What a bent leaf reflects toward the eye differs over it more than one distribution can tell.

@@ -12,6 +12,7 @@ use crate::links::Links;
 use crate::place::{Class, Gathered, Placed, place, renewed};
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
+use crate::skips::Skips;
 use crate::stats::Stats;
 use crate::steady;
 use crate::transport::{Exitant, Light};
@@ -112,7 +113,8 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) settings: Settings,
     pub(crate) stats: Stats,
     account: Account,
-    unlit: Vec<Pair>,
+    pub(crate) skips: Skips,
+    pub(crate) unlit: Vec<Pair>,
     /// Irradiance through a node's own links, on flat nodes.
     own: Vec<Gathered>,
     /// Light through a node's own links, on nodes that are not flat.
@@ -144,6 +146,11 @@ impl<L: LightField> Solver<L> {
     /// A [`SolveError`] where the scene is empty, some surface, material, light or the error asked for makes no
     /// sense, or light would grow without end ([`SolveError::NoSteadyState`]).
     pub fn new(input: &SceneInput, settings: Settings, field: L) -> Result<Self, SolveError> {
+        Self::skipping(input, settings, field, Skips::ALL)
+    }
+
+    /// [`new`](Self::new) with a say in what is skipped.
+    pub(crate) fn skipping(input: &SceneInput, settings: Settings, field: L, skips: Skips) -> Result<Self, SolveError> {
         let start = Instant::now();
         if !(0.001..=1.0).contains(&settings.error) {
             return Err(SolveError::Error { error: settings.error });
@@ -157,7 +164,7 @@ impl<L: LightField> Solver<L> {
             })
             .unzip();
         steady::check(&scene, |material| field.active(material).unwrap_or(Rgb::ZERO))?;
-        let elements = Elements::build(&scene, |material| field.active(material));
+        let elements = Elements::build(&scene, |material| field.active(material), skips);
         let count = elements.nodes.len();
         let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
         let mut solver = Self {
@@ -181,6 +188,7 @@ impl<L: LightField> Solver<L> {
             settings,
             stats: Stats { polygons: input.surfaces.len() as u64, ..Stats::default() },
             account: Account::new(settings.budget, start),
+            skips,
             unlit: vec![Pair { receiver: 0, sender: 0 }],
             own: Vec::new(),
             transfers: Vec::new(),
@@ -270,6 +278,7 @@ impl<L: LightField> Solver<L> {
             error: LINK_SHARE * self.settings.error * looseness * self.mean_irradiance(),
             area: self.area,
             smallest: SMALLEST_SHARE * self.settings.error.sqrt(),
+            skips: self.skips,
         };
         let error = self.believed_error(looseness);
         self.convergence.restart();
@@ -306,7 +315,7 @@ impl<L: LightField> Solver<L> {
 
     /// One iteration of the paper: gather, push, reflect, pull. Returns the change of the mean radiosity, relative
     /// to it; `None`, and no change, where `watch` broke before the light was gathered.
-    fn iterate(&mut self, reflects: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Option<f32> {
+    pub(crate) fn iterate(&mut self, reflects: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Option<f32> {
         let before: Vec<Rgb> = self.exitant.irradiance.clone();
         let start = Instant::now();
         if self.gather(watch).is_break() {
@@ -519,14 +528,14 @@ impl<L: LightField> Solver<L> {
         }
     }
 
-    /// Mean irradiance of the surfaces that any light reaches; before there is any, that which the emitted power
+    /// Mean irradiance of the surfaces that any light reaches and that reflect any; before there is any, that which the emitted power
     /// would make if it were spread evenly. The measure of every tolerance.
     fn mean_irradiance(&self) -> f32 {
         let (mut lit, mut area, mut power) = (0.0_f64, 0.0_f64, 0.0_f64);
         for leaf in self.elements.patch_leaves() {
             let (element, leaf) = (&self.elements.nodes[leaf as usize], leaf as usize);
             let irradiance = self.exitant.irradiance[leaf].max_element();
-            if irradiance > 0.0 {
+            if irradiance > 0.0 && element.importance > 0.0 {
                 lit += f64::from(irradiance * element.area);
                 area += f64::from(element.area);
             }

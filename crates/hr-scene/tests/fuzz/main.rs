@@ -16,7 +16,7 @@ use hr_scene::{Camera, Scene, SceneError};
 use mutate::{Source, mutated};
 use peak_alloc::PeakAlloc;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::Duration;
 
@@ -40,7 +40,7 @@ fn number(name: &str, otherwise: u32) -> u32 {
 }
 
 /// Loads a file; tells whether there was a scene.
-fn check_scene(path: &PathBuf) -> Result<bool, String> {
+fn check_scene(path: &Path) -> Result<bool, String> {
     let scene = match Scene::load(&path.to_string_lossy()) {
         Ok(scene) => Arc::new(scene),
         Err(error) => return check_error(&error).map(|()| false),
@@ -71,7 +71,7 @@ fn check_scene(path: &PathBuf) -> Result<bool, String> {
     Ok(true)
 }
 
-fn check_camera(path: &PathBuf) -> Result<bool, String> {
+fn check_camera(path: &Path) -> Result<bool, String> {
     match Camera::load(path) {
         Ok(camera) if camera.direction(0.5, 0.5).is_finite() => Ok(true),
         Ok(camera) => Err(format!("it looks nowhere: {camera:?}")),

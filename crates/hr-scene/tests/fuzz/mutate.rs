@@ -20,7 +20,7 @@ impl Source {
 
     /// 0…`count` − 1; 0 where there is nothing to choose from.
     pub(crate) fn below(&mut self, count: usize) -> usize {
-        (u64::from(self.next()) * count as u64 >> 32) as usize
+        ((u64::from(self.next()) * count as u64) >> 32) as usize
     }
 
     fn of<T: Copy>(&mut self, values: &[T]) -> T {
