@@ -15,9 +15,9 @@ use std::time::{Duration, Instant};
 /// time the result depends on the machine's speed; with one of memory it does not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Budget {
-    /// Wall-clock time from the making of the solver (the scene's hierarchy included) to the end of refinement. Light that
-    /// has not settled after a quarter more is left as it is. Values at vertices and the final reflection for display
-    /// come after it.
+    /// Wall-clock time from the making of the solver (the scene's hierarchy included) to the end of refinement. Light may
+    /// settle for a quarter more; then a few iterations over the links that there are must do. Values at vertices and the
+    /// final reflection for display come after it.
     pub time: Option<Duration>,
     /// Bytes of elements, links and what the extension keeps of them while light is transported; of the whole process
     /// this is about a half. What the scene itself takes must be had anyhow: no budget is too small for a first solution.
@@ -34,7 +34,7 @@ pub enum Spent {
     Memory,
 }
 
-/// After the end of refinement by a budget of time, light may settle for this share of it.
+/// After the end of refinement light may settle for this share of a budget of time.
 const SETTLING: f64 = 0.25;
 
 /// Parts of an element that is split, at most.

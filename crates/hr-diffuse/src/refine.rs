@@ -46,8 +46,10 @@ const MOST_SEGMENTS: u32 = 32;
 
 /// Nodes nearer than this many times the sum of their radii may be parts of one convex object, …
 const NEIGHBOURS: f32 = 2.0;
-/// … which is found out by so many pairs of points.
+/// … which is found out by so many pairs of points. If none of them faces each other, no more than this share of all does
+/// (with 95% confidence: the rule of three), which is left out where it is too little to count.
 const PROBES: u32 = 64;
+const UNSEEN: f32 = 3.0 / PROBES as f32;
 
 /// A link to be, between two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -352,9 +354,11 @@ fn decide<L: LightField>(
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
     let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);
-    if skips.facing
+    let at_stake = weight * interval.most * UNSEEN;
+    if skips.averted
         && touching
-        && (r.kind == Kind::Cluster || s.kind == Kind::Cluster)
+        && !(r.is_flat() && s.is_flat())
+        && at_stake <= tolerance.error
         && !segments::any_facing(light, pair.receiver, pair.sender, PROBES)
     {
         return Verdict::Facing;

@@ -5,14 +5,17 @@
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Skips {
     pub(crate) black_receivers: bool,
+    /// Pairs that are proved not to face each other, …
     pub(crate) facing: bool,
+    /// … and those that hardly do, by samples.
+    pub(crate) averted: bool,
     pub(crate) sealed_sides: bool,
     pub(crate) converged_leaves: bool,
 }
 
 impl Skips {
     pub(crate) const ALL: Self =
-        Self { black_receivers: true, facing: true, sealed_sides: true, converged_leaves: true };
+        Self { black_receivers: true, facing: true, averted: true, sealed_sides: true, converged_leaves: true };
 }
 
 #[cfg(test)]

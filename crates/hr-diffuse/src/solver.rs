@@ -228,23 +228,24 @@ impl<L: LightField> Solver<L> {
                 let progress = self.progress(Phase::Transport, fraction, *looseness);
                 let ask = &mut || {
                     stopped = stopped || watch(&progress).is_break();
-                    if stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                    if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
                 };
                 // Once the light is there, and what is linked is fine enough.
                 let places = last && iteration == if pass < PASSES.len() { 1 } else { 0 };
                 if places {
-                    self.place(ask);
+                    self.place(&mut || if account.is_over() { ControlFlow::Break(()) } else { ask() });
                 }
                 let Some(residual) = self.iterate(pass >= FIRST_REFLECTED, ask) else { break };
                 if self.grows() {
                     self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
                 }
-                if stopped || self.remaining(residual) < goal && (places || iteration > 0) {
+                let settled = self.remaining(residual) < goal && (places || iteration > 0);
+                if stopped || settled || account.is_over() {
                     break;
                 }
             }
             self.measure();
-            if stopped || account.is_over() || last && !changed {
+            if stopped || last && !changed {
                 break;
             }
         }

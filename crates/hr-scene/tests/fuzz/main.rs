@@ -58,6 +58,9 @@ fn check_scene(path: &Path) -> Result<bool, String> {
         // What loading cannot see, or mend.
         Err(SolveError::NoSteadyState { .. } | SolveError::Light { .. }) => return Ok(true),
         Err(SolveError::Surface { source: GeometryError::Vanishing, .. }) => return Ok(true),
+        Err(SolveError::Surface { surface, source }) => {
+            return Err(format!("{source}, though it was loaded: {:?}", scene.surfaces[surface]));
+        }
         Err(error) => return Err(format!("a scene that was loaded cannot be solved: {error}")),
     };
     solver.solve(&mut |_| ControlFlow::Continue(()));
