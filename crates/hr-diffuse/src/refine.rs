@@ -7,7 +7,7 @@
 use crate::Rgb;
 use crate::budget::{Account, Growth, Spent};
 use crate::form_factor::{self, Accuracy, Part};
-use crate::hierarchy::{Elements, Kind};
+use crate::hierarchy::{Element, Elements, Kind};
 use crate::hooks::LightField;
 use crate::links::Link;
 use crate::oracle::{FactorBounds, factor_bounds};
@@ -282,7 +282,18 @@ fn inherited<L: LightField>(light: Light<'_, L>, candidate: &Candidate) -> Optio
     // A light without extent has no area, and no parts.
     let share = if from.sender == pair.sender { 1.0 } else { sender.area / whole.area };
     let visibility = if share < 1.0 { from.visibility.abs() } else { from.visibility };
-    Some(Link { receiver: pair.receiver, sender: pair.sender, factor: from.factor * share, visibility })
+    let factor = (from.factor * share).min(most_factor(light.element(pair.receiver), sender));
+    Some(Link { receiver: pair.receiver, sender: pair.sender, factor, visibility })
+}
+
+/// Most that a link's factor may be: nobody takes up more than all of a view, nor more than all that is sent. F ≤ 1 and, by
+/// reciprocity, F ≤ Aₛ/Aᵣ; a few points of the receiver, or a link of something larger, may say otherwise.
+fn most_factor(receiver: &Element, sender: &Element) -> f32 {
+    match sender.kind {
+        Kind::Light => f32::INFINITY,
+        Kind::Front | Kind::Back if receiver.is_flat() => (sender.area / receiver.area).min(1.0),
+        _ => 1.0,
+    }
 }
 
 /// Irradiance interval of a pair, split by cause.
@@ -387,7 +398,7 @@ fn decide<L: LightField>(
     let mut link = Link {
         receiver: pair.receiver,
         sender: pair.sender,
-        factor: mean_factor(light, pair, relative),
+        factor: mean_factor(light, pair, relative).min(most_factor(r, s)),
         visibility: 0.0,
     };
     if link.factor <= 0.0 && bounds.max > 0.0 && !stopped {

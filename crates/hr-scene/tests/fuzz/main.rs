@@ -57,6 +57,7 @@ fn check_scene(path: &Path) -> Result<bool, String> {
         Ok(solver) => solver,
         // What loading cannot see, or mend.
         Err(SolveError::NoSteadyState { .. } | SolveError::Light { .. }) => return Ok(true),
+        Err(SolveError::MaterialValue { what: "exitance", .. }) => return Ok(true),
         Err(SolveError::Surface { source: GeometryError::Vanishing, .. }) => return Ok(true),
         Err(SolveError::Surface { surface, source }) => {
             return Err(format!("{source}, though it was loaded: {:?}", scene.surfaces[surface]));
