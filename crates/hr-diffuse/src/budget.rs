@@ -10,18 +10,18 @@ use std::time::{Duration, Instant};
 
 /// What a solve may cost; without limits by default.
 ///
-/// Refinement ends as soon as one of the budgets is spent. Light still settles over what is linked by then, so the solution
-/// is a coarser one, not a darker one; [`Stats::spent`](crate::Stats::spent) tells which budget it was. With a budget of
-/// time the result depends on the machine's speed; with one of memory it does not.
+/// Refinement ends as soon as one of the budgets is spent. Light still settles over what is linked by then, so the
+/// solution is a coarser one, not a darker one; [`Stats::spent`](crate::Stats::spent) tells which budget it was. With a
+/// budget of time the result depends on the machine's speed; with one of memory it does not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Budget {
-    /// Wall-clock time from the making of the solver (the scene's hierarchy included) to the end of refinement. Light may
-    /// settle for a quarter more; then a few iterations over the links that there are must do. Values at vertices and the
-    /// final reflection for display come after it.
+    /// Wall-clock time from the making of the solver (the scene's hierarchy included) to the end of refinement. Light
+    /// may settle for a quarter more; then a few iterations over the links that there are must do. Values at vertices
+    /// and the final reflection for display come after it.
     pub time: Option<Duration>,
-    /// Bytes of elements, links and what the extension keeps of them while light is transported; of the whole process
-    /// this is about a half. What the scene itself takes must be had anyhow: no budget is too small for a first solution.
-    /// The final reflection for display takes more.
+    /// Bytes of elements, links and what the extension keeps of them while light is transported; the pairs that a
+    /// refinement looks at come on top. What the scene itself takes must be had anyhow: no budget is too small for a
+    /// first solution. The final reflection for display takes more.
     pub memory: Option<u64>,
 }
 

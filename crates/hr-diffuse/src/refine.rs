@@ -460,9 +460,8 @@ fn choose<L: LightField>(
     prefer_sender: bool,
 ) -> Option<Verdict> {
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
-    let can_split = |e: &crate::hierarchy::Element| {
-        e.kind == Kind::Cluster || e.is_patch() && (e.child_count > 0 || e.radius > tolerance.smallest)
-    };
+    let can_split =
+        |e: &Element| e.kind == Kind::Cluster || e.is_patch() && (e.child_count > 0 || e.radius > tolerance.smallest);
     // A sphere looks the same from everywhere: where it is evenly lit, its parts tell nothing new.
     let (receiver, sender) = (can_split(r), can_split(s) && (prefer_sender || !s.whole_sphere));
     match (receiver, sender) {
