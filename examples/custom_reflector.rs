@@ -99,7 +99,7 @@ fn scene() -> Result<Scene, Box<dyn Error>> {
 #[expect(clippy::print_stdout, reason = "an example tells where its picture is")]
 fn main() -> Result<(), Box<dyn Error>> {
     let scene = Arc::new(scene()?);
-    let solved = Solved::new(Arc::clone(&scene), Settings { error: 0.1 }, true, &mut |_| ControlFlow::Continue(()))?;
+    let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.1), true, &mut |_| ControlFlow::Continue(()))?;
     let image = RayCaster::new(&scene, &solved.solution, Mode::Samples).render(&scene.cameras[0].1, &|_| ());
     let path = Path::new("custom_reflector.png");
     image.save(path, &ToneMap::default(), scene.primaries)?;

@@ -35,7 +35,7 @@ fn main() -> Result<(), SolveError> {
     let input = SceneInput { surfaces, materials: vec![plaster, lamp], ..SceneInput::default() };
 
     // Solve to 5 %. The closures could show progress, or break to stop early.
-    let mut solver = Solver::new(&input, Settings { error: 0.05 }, ())?;
+    let mut solver = Solver::new(&input, Settings::with_error(0.05), ())?;
     solver.solve(&mut |_| ControlFlow::Continue(()));
     let solution = solver.finish(&mut |_| ControlFlow::Continue(()));
 

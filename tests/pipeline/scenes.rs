@@ -110,7 +110,7 @@ impl Room {
 
 /// Solves without being watched.
 pub(crate) fn solve<L: LightField>(input: &SceneInput, error: f32, field: L) -> Solution<L> {
-    let mut solver = Solver::new(input, Settings { error }, field).expect("the scene is sound");
+    let mut solver = Solver::new(input, Settings::with_error(error), field).expect("the scene is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
     solver.finish(&mut |_| ControlFlow::Continue(()))
 }

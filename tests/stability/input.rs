@@ -103,7 +103,7 @@ fn wrong_lights_are_named() {
 #[test]
 fn the_error_asked_for_has_a_range() {
     for error in [0.0, -0.1, 0.000_99, 1.01, f32::NAN, f32::INFINITY] {
-        let answer = Solver::new(&scene(), Settings { error }, ()).map(|_| ()).expect_err("out of range");
+        let answer = Solver::new(&scene(), Settings::with_error(error), ()).map(|_| ()).expect_err("out of range");
         assert!(matches!(answer, SolveError::Error { .. }), "{error}: {answer}");
         assert!(answer.to_string().contains("0.001"), "says what would be right: {answer}");
     }
@@ -196,7 +196,7 @@ fn hostile_numbers_give_an_error_or_a_finite_answer() {
                 assert!(index > 100, "all numbers: {index}");
                 break;
             }
-            let Ok(mut solver) = Solver::new(&input, Settings { error: 1.0 }, ()) else { continue };
+            let Ok(mut solver) = Solver::new(&input, Settings::with_error(1.0), ()) else { continue };
             solved += 1;
             let mut steps = 0;
             let mut watch = |_: &hr_diffuse::Progress| {

@@ -4,9 +4,10 @@ use crate::answers::assert_sane;
 use glam::{DVec3, Vec3};
 use hr_diffuse::sampling::{hash, unit};
 use hr_diffuse::{
-    DiffuseMaterial, Light, LightKind, Progress, Rgb, SceneInput, Settings, Shape, SolveError, Solver, Surface,
+    Budget, DiffuseMaterial, Light, LightKind, Progress, Rgb, SceneInput, Settings, Shape, SolveError, Solver, Surface,
 };
 use std::ops::ControlFlow;
+use std::time::Duration;
 
 /// Scenes per test, where `STABILITY_CASES` does not say.
 const CASES: u32 = 100;
@@ -150,7 +151,10 @@ fn random_scenes_are_refused_or_solved() {
     let mut solved = 0;
     for case in 0..cases() {
         let mut source = Source::new(0xa11, case);
-        let settings = Settings { error: source.of(&[1.0, 0.5, 0.2, 0.05]) };
+        let error = source.of(&[1.0, 0.5, 0.2, 0.05]);
+        let memory = source.of(&[None, None, Some(0), Some(100_000), Some(u64::MAX)]);
+        let time = source.of(&[None, None, Some(Duration::ZERO), Some(Duration::from_millis(20)), Some(Duration::MAX)]);
+        let settings = Settings { error, budget: Budget { time, memory } };
         let Some((input, mut solver)) = mended(source.scene(), settings) else { continue };
         let mut calls = 0;
         let mut watch = |_: &Progress| {
@@ -176,7 +180,7 @@ fn random_scenes_do_not_make_light() {
         for material in &mut input.materials {
             material.reflectance *= 0.5;
         }
-        let Some((input, mut solver)) = mended(input, Settings { error: 0.5 }) else { continue };
+        let Some((input, mut solver)) = mended(input, Settings::with_error(0.5)) else { continue };
         let mut calls = 0;
         let mut watch = |_: &Progress| {
             calls += 1;

@@ -18,7 +18,7 @@ struct Watched {
 fn stopped_at(call: u32) -> Watched {
     let room = Room::new();
     let field = GlossyField::new(&room.reflectors, Refinement::default());
-    let mut solver = Solver::new(&room.input, Settings { error: 0.2 }, field).expect("the room is sound");
+    let mut solver = Solver::new(&room.input, Settings::with_error(0.2), field).expect("the room is sound");
     let (mut calls, mut after) = (0, 0);
     let mut watch = |progress: &Progress| {
         assert!((0.0..=1.0).contains(&progress.fraction), "{progress:?}");
@@ -72,7 +72,7 @@ fn what_comes_out_early_is_the_light_so_far() {
 fn calls_are_as_many_as_the_work_asks_for() {
     let room = Room::new();
     let field = GlossyField::new(&room.reflectors, Refinement::default());
-    let mut solver = Solver::new(&room.input, Settings { error: 0.1 }, field).expect("the room is sound");
+    let mut solver = Solver::new(&room.input, Settings::with_error(0.1), field).expect("the room is sound");
     let (mut refining, mut reconstructing) = (0_u64, 0_u64);
     let mut watch = |progress: &Progress| {
         refining += u64::from(progress.phase == Phase::Refine);

@@ -182,6 +182,14 @@ impl LightField for GlossyField {
         self.material(Some(material)).map(|m| m.albedo)
     }
 
+    fn incident_bytes(&self, incident: &SampleSet) -> usize {
+        size_of_val(&**incident)
+    }
+
+    fn exitant_bytes(&self, exitant: &Haar) -> usize {
+        exitant.bytes() - size_of::<Haar>()
+    }
+
     fn clear(&self, incident: &mut SampleSet) {
         incident.clear();
     }

@@ -26,8 +26,9 @@ pub fn report(subjects: &[Subject], errors: &[f32], out: Out<'_>) -> Result<(), 
     for subject in subjects {
         for &error in errors {
             let start = Instant::now();
-            let solved =
-                Solved::new(Arc::clone(&subject.scene), Settings { error }, true, &mut |_| ControlFlow::Continue(()))?;
+            let solved = Solved::new(Arc::clone(&subject.scene), Settings::with_error(error), true, &mut |_| {
+                ControlFlow::Continue(())
+            })?;
             let seconds = start.elapsed().as_secs_f64();
             let stats = &solved.solution.stats;
             let (links, rays, leaves) = (stats.links, stats.rays + stats.vertex_rays, stats.leaves);

@@ -1,9 +1,7 @@
 //! One diffuse solve, and what it cost.
 
 use crate::BenchError;
-use hr_diffuse::hierarchy::Element;
-use hr_diffuse::links::Link;
-use hr_diffuse::{Facing, Rgb, SceneInput, Settings, Solution, Solver};
+use hr_diffuse::{SceneInput, Settings, Solution, Solver};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -30,7 +28,7 @@ pub struct Cost {
     pub links: u64,
     /// Visibility rays of the solve.
     pub rays: u64,
-    /// Bytes that nodes, their light and links take at the least: see [`bytes`].
+    /// Bytes that nodes, their light and links take: see [`Stats::bytes`](hr_diffuse::Stats::bytes).
     pub bytes: u64,
     /// Most memory that the process had until the solve ended, values at vertices not included; 0 where unknown.
     pub peak: u64,
@@ -66,14 +64,6 @@ pub fn cpu_seconds() -> f64 {
     f64::NAN
 }
 
-/// Bytes of a diffuse solution's nodes with their exitant light, and of its links.
-#[must_use]
-pub fn bytes(nodes: u64, links: u64) -> u64 {
-    // Radiosity, range, irradiance, directional; facing; whose light it is, gain, peak.
-    let light = 5 * size_of::<Rgb>() + size_of::<Facing>() + size_of::<[u32; 3]>();
-    nodes * (size_of::<Element>() + light) as u64 + links * size_of::<Link>() as u64
-}
-
 /// Solves the diffuse light in a scene on `threads` threads (0: all cores).
 ///
 /// # Errors
@@ -84,7 +74,7 @@ pub fn solve(input: &SceneInput, error: f32, threads: usize, extent: Extent) -> 
     pool.install(|| {
         let (start, cpu) = (Instant::now(), cpu_seconds());
         let (mut believed, mut stopped) = (f32::NAN, false);
-        let mut solver = Solver::new(input, Settings { error }, ())?;
+        let mut solver = Solver::new(input, Settings::with_error(error), ())?;
         solver.solve(&mut |progress| {
             believed = progress.error;
             if extent.limit.is_some_and(|limit| start.elapsed() > limit) {
@@ -110,7 +100,7 @@ pub fn solve(input: &SceneInput, error: f32, threads: usize, extent: Extent) -> 
             leaves: stats.leaves,
             links: stats.links,
             rays: stats.rays,
-            bytes: bytes(stats.nodes, stats.links),
+            bytes: stats.bytes,
             peak,
             believed,
             stopped,

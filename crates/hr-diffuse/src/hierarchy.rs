@@ -10,6 +10,7 @@ use crate::geometry::{Domain, FACETS, Facet, Geometry};
 use crate::hooks::{FLAT_COSINE, Hierarchy, NodeId};
 use crate::scene::{Light, LightKind};
 use crate::sealed::{Side, is_back, lit_sides};
+use crate::skips::Skips;
 use crate::visibility::Visibility;
 use crate::{Cone, DiffuseMaterial, Facing, Rgb, SurfaceReflectance};
 use glam::{Vec2, Vec3, Vec3A};
@@ -193,11 +194,12 @@ impl obvhs::Boundable for Boxed {
 impl Elements {
     /// Builds clusters and one element per surface and reflecting side. `extra` tells how much an extension
     /// reflects of a material beside the diffuse part; `None` where it takes no part.
-    pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<Rgb>) -> Self {
+    pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<Rgb>, skips: Skips) -> Self {
         let mut roots: Vec<Element> = Vec::new();
         let mut sealed = vec![[false; 2]; scene.surfaces().len()];
         let idle = idle(scene, &extra);
-        for (i, lit) in lit_sides(scene, &idle).into_iter().enumerate() {
+        let lit = if skips.sealed_sides { lit_sides(scene, &idle) } else { vec![[true; 2]; idle.len()] };
+        for (i, lit) in lit.into_iter().enumerate() {
             if scene.is_twin(i as u32) {
                 continue;
             }

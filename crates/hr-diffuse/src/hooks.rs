@@ -128,6 +128,14 @@ pub trait LightField: Sync {
     fn radiance(&self, exitant: &Self::Exitant, away: Vec3) -> Rgb;
     /// Smallest and largest [`radiance`](Self::radiance) over a cone of directions.
     fn radiance_bounds(&self, exitant: &Self::Exitant, away: &Cone) -> (Rgb, Rgb);
+    /// Bytes that a node's incident light takes beside those of `Incident` itself; for budgets of memory.
+    fn incident_bytes(&self, _incident: &Self::Incident) -> usize {
+        0
+    }
+    /// The same for exitant light.
+    fn exitant_bytes(&self, _exitant: &Self::Exitant) -> usize {
+        0
+    }
 }
 
 /// The purely diffuse engine.

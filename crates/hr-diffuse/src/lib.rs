@@ -6,6 +6,7 @@
 //! [`scene`] → [`hierarchy`] → ([`oracle`] → refinement → [`links`], with [`form_factor`] and [`visibility`]) →
 //! gather → push → [`hooks`]' reflect → pull ([`solver`]) → [`reconstruct`] → [`solution`].
 
+pub mod budget;
 mod columns;
 pub mod cone;
 mod convergence;
@@ -27,6 +28,7 @@ pub mod sampling;
 pub mod scene;
 mod sealed;
 mod segments;
+mod skips;
 pub mod solution;
 pub mod solver;
 pub mod stats;
@@ -35,6 +37,7 @@ pub mod transport;
 mod twins;
 pub mod visibility;
 
+pub use budget::{Budget, Spent};
 pub use cone::Cone;
 pub use error::SolveError;
 pub use facing::Facing;

@@ -76,3 +76,6 @@ impl Links {
         std::mem::take(&mut self.all)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -21,6 +21,11 @@ pub struct FactorBounds {
     pub from_sender: Cone,
 }
 
+impl FactorBounds {
+    /// Of pairs that do not face each other.
+    pub(crate) const NONE: Self = Self { min: 0.0, max: 0.0, from_sender: Cone::SPHERE };
+}
+
 /// Bounds for a pair, or `None` where the elements provably do not face each other: no light passes.
 #[must_use]
 pub fn factor_bounds(scene: &SceneData, receiver: &Element, sender: &Element) -> Option<FactorBounds> {

@@ -5,12 +5,14 @@
 //! not depend on the number of threads.
 
 use crate::Rgb;
+use crate::budget::{Account, Growth, Spent};
 use crate::form_factor::{self, Accuracy, Part};
-use crate::hierarchy::{Elements, Kind};
+use crate::hierarchy::{Element, Elements, Kind};
 use crate::hooks::LightField;
 use crate::links::Link;
 use crate::oracle::{FactorBounds, factor_bounds};
 use crate::segments;
+use crate::skips::Skips;
 use crate::stats::Skipped;
 use crate::transport::{Exitant, Light};
 use glam::{DVec3, Vec3};
@@ -44,8 +46,10 @@ const MOST_SEGMENTS: u32 = 32;
 
 /// Nodes nearer than this many times the sum of their radii may be parts of one convex object, …
 const NEIGHBOURS: f32 = 2.0;
-/// … which is found out by so many pairs of points.
+/// … which is found out by so many pairs of points. If none of them faces each other, no more than this share of all does
+/// (with 95% confidence: the rule of three), which is left out where it is too little to count.
 const PROBES: u32 = 64;
+const UNSEEN: f32 = 3.0 / PROBES as f32;
 
 /// A link to be, between two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +67,8 @@ pub(crate) struct Tolerance {
     pub(crate) area: f32,
     /// Radius in unit space below which elements are not split.
     pub(crate) smallest: f32,
+    /// Pairs that need no link.
+    pub(crate) skips: Skips,
 }
 
 /// What becomes of a pair.
@@ -76,6 +82,18 @@ enum Verdict {
     SplitBoth,
 }
 
+impl Verdict {
+    /// The nodes of a pair that are to be split.
+    fn split(&self, pair: Pair) -> SmallVec<[u32; 2]> {
+        match self {
+            Self::SplitReceiver => smallvec![pair.receiver],
+            Self::SplitSender => smallvec![pair.sender],
+            Self::SplitBoth => smallvec![pair.receiver, pair.sender],
+            _ => SmallVec::new(),
+        }
+    }
+}
+
 /// What a refinement made.
 #[derive(Debug, Default)]
 pub(crate) struct Refined {
@@ -86,6 +104,7 @@ pub(crate) struct Refined {
     pub(crate) rays: u64,
     pub(crate) visibility_seconds: f64,
     pub(crate) stopped: bool,
+    pub(crate) spent: Option<Spent>,
     pub(crate) changed: bool,
 }
 
@@ -112,13 +131,14 @@ impl Candidate {
 }
 
 /// Refines `links` and `unlit` pairs until each is within tolerance. `watch` is asked every few milliseconds with the
-/// number of pairs in a wave and of links; once it breaks, pairs keep the link that they come from, or are linked as
+/// number of pairs in a wave and of links; once it breaks, or a budget is spent, pairs keep the link that they come from, or are linked as
 /// they are.
 pub(crate) fn refine<L: LightField>(
     light: &mut MutableLight<'_, L>,
     links: Vec<Link>,
     unlit: Vec<Pair>,
     tolerance: Tolerance,
+    account: &Account,
     watch: &mut dyn FnMut(u64, u64) -> ControlFlow<()>,
 ) -> Refined {
     let mut refined = Refined::default();
@@ -132,15 +152,28 @@ pub(crate) fn refine<L: LightField>(
         refined.pairs += wave.len() as u64;
         let reader = light.read();
         let mut verdicts: Vec<Verdict> = Vec::with_capacity(wave.len());
-        for part in wave.chunks(BETWEEN_WATCHES * rayon::current_num_threads()) {
+        let mut growth = Growth::new(reader.elements, refined.links.len() + wave.len());
+        while verdicts.len() < wave.len() {
+            let first = verdicts.len();
+            let part = &wave[first..wave.len().min(first + BETWEEN_WATCHES * rayon::current_num_threads())];
             refined.stopped = refined.stopped || watch(wave.len() as u64, refined.links.len() as u64).is_break();
-            let stopped = refined.stopped;
+            refined.spent = refined.spent.or(account.is_late().then_some(Spent::Time));
+            let stopped = refined.stopped || refined.spent.is_some();
             let decided = part.par_iter().with_min_len(32).map(|candidate| {
                 let inherited = if stopped { inherited(reader, candidate) } else { None };
                 let decided = || decide(reader, candidate.pair, candidate.own(), tolerance, stopped, &counters);
                 inherited.map_or_else(decided, Verdict::Keep)
             });
             verdicts.par_extend(decided);
+            // Pair by pair: where memory ends does not depend on the number of threads.
+            let full = (first..verdicts.len()).find(|&i| {
+                growth.add(reader.elements, &verdicts[i].split(wave[i].pair));
+                !stopped && account.is_full::<L>(growth.nodes, growth.links)
+            });
+            if let Some(last) = full {
+                refined.spent = Some(Spent::Memory);
+                verdicts.truncate(last + 1);
+            }
         }
         split_elements(light, &wave, &verdicts);
         let elements = &*light.elements;
@@ -210,13 +243,7 @@ impl<L: LightField> MutableLight<'_, L> {
 
 fn split_elements<L: LightField>(light: &mut MutableLight<'_, L>, wave: &[Candidate], verdicts: &[Verdict]) {
     for (Candidate { pair, .. }, verdict) in wave.iter().zip(verdicts) {
-        let nodes: SmallVec<[u32; 2]> = match verdict {
-            Verdict::SplitReceiver => smallvec![pair.receiver],
-            Verdict::SplitSender => smallvec![pair.sender],
-            Verdict::SplitBoth => smallvec![pair.receiver, pair.sender],
-            _ => continue,
-        };
-        for node in nodes {
+        for node in verdict.split(*pair) {
             light.elements.split(light.scene, node);
             let (scene, exitant) = (light.scene, &mut *light.exitant);
             for child in exitant.radiosity.len()..light.elements.nodes.len() {
@@ -255,7 +282,18 @@ fn inherited<L: LightField>(light: Light<'_, L>, candidate: &Candidate) -> Optio
     // A light without extent has no area, and no parts.
     let share = if from.sender == pair.sender { 1.0 } else { sender.area / whole.area };
     let visibility = if share < 1.0 { from.visibility.abs() } else { from.visibility };
-    Some(Link { receiver: pair.receiver, sender: pair.sender, factor: from.factor * share, visibility })
+    let factor = (from.factor * share).min(most_factor(light.element(pair.receiver), sender));
+    Some(Link { receiver: pair.receiver, sender: pair.sender, factor, visibility })
+}
+
+/// Most that a link's factor may be: nobody takes up more than all of a view, nor more than all that is sent. F ≤ 1 and, by
+/// reciprocity, F ≤ Aₛ/Aᵣ; a few points of the receiver, or a link of something larger, may say otherwise.
+fn most_factor(receiver: &Element, sender: &Element) -> f32 {
+    match sender.kind {
+        Kind::Light => f32::INFINITY,
+        Kind::Front | Kind::Back if receiver.is_flat() => (sender.area / receiver.area).min(1.0),
+        _ => 1.0,
+    }
 }
 
 /// Irradiance interval of a pair, split by cause.
@@ -304,10 +342,11 @@ fn decide<L: LightField>(
     counters: &Counters,
 ) -> Verdict {
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
-    if r.importance <= 0.0 || r.kind == Kind::Light {
+    let skips = tolerance.skips;
+    if skips.black_receivers && r.importance <= 0.0 || r.kind == Kind::Light {
         return Verdict::Black;
     }
-    if r.is_patch() && s.is_patch() && r.source == s.source && r.convex && r.kind == s.kind {
+    if skips.facing && r.is_patch() && s.is_patch() && r.source == s.source && r.convex && r.kind == s.kind {
         return Verdict::Facing;
     }
     let own = pair.receiver == pair.sender;
@@ -317,13 +356,22 @@ fn decide<L: LightField>(
     if own {
         return split_self(light, pair.receiver, tolerance, stopped);
     }
-    let Some(bounds) = factor_bounds(light.scene, r, s) else { return Verdict::Facing };
+    let Some(bounds) = factor_bounds(light.scene, r, s).or_else(|| (!skips.facing).then_some(FactorBounds::NONE))
+    else {
+        return Verdict::Facing;
+    };
     let weight = r.importance * (r.area / tolerance.area).sqrt();
     let interval = interval(light, pair.sender, &bounds, tolerance.error / weight);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
     let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);
-    if touching && !(r.is_flat() && s.is_flat()) && !segments::any_facing(light, pair.receiver, pair.sender, PROBES) {
+    let at_stake = weight * interval.most * UNSEEN;
+    if skips.averted
+        && touching
+        && !(r.is_flat() && s.is_flat())
+        && at_stake <= tolerance.error
+        && !segments::any_facing(light, pair.receiver, pair.sender, PROBES)
+    {
         return Verdict::Facing;
     }
     // What a bent leaf reflects toward the eye differs over it more than one distribution can tell.
@@ -350,7 +398,7 @@ fn decide<L: LightField>(
     let mut link = Link {
         receiver: pair.receiver,
         sender: pair.sender,
-        factor: mean_factor(light, pair, relative),
+        factor: mean_factor(light, pair, relative).min(most_factor(r, s)),
         visibility: 0.0,
     };
     if link.factor <= 0.0 && bounds.max > 0.0 && !stopped {
@@ -412,9 +460,8 @@ fn choose<L: LightField>(
     prefer_sender: bool,
 ) -> Option<Verdict> {
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
-    let can_split = |e: &crate::hierarchy::Element| {
-        e.kind == Kind::Cluster || e.is_patch() && (e.child_count > 0 || e.radius > tolerance.smallest)
-    };
+    let can_split =
+        |e: &Element| e.kind == Kind::Cluster || e.is_patch() && (e.child_count > 0 || e.radius > tolerance.smallest);
     // A sphere looks the same from everywhere: where it is evenly lit, its parts tell nothing new.
     let (receiver, sender) = (can_split(r), can_split(s) && (prefer_sender || !s.whole_sphere));
     match (receiver, sender) {

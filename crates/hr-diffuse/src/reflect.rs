@@ -196,7 +196,7 @@ impl<L: LightField> Solver<L> {
             .filter(|&Standing { leaf, .. }| {
                 let now = self.exitant.irradiance[leaf as usize];
                 let change = (now - self.last_reflected[leaf as usize]).abs().max_element();
-                change > tolerance * now.max_element()
+                !self.skips.converged_leaves || change > tolerance * now.max_element()
             })
             .collect();
         self.stats.skipped.converged_leaves += (leaves.len() - changed.len()) as u64;

@@ -1,5 +1,6 @@
 //! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
 
+use crate::budget::{Account, Budget};
 use crate::columns::{FREELY, STRICTLY, gains};
 use crate::convergence::Convergence;
 use crate::error::SolveError;
@@ -11,6 +12,7 @@ use crate::links::Links;
 use crate::place::{Class, Gathered, Placed, place, renewed};
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
+use crate::skips::Skips;
 use crate::stats::Stats;
 use crate::steady;
 use crate::transport::{Exitant, Light};
@@ -53,11 +55,21 @@ const FAINT_CHANNEL: f64 = 1e-3;
 pub struct Settings {
     /// Relative error of the solution, 0.001…1: 0.02 is fine, 0.1 coarse.
     pub error: f32,
+    /// What it may cost.
+    pub budget: Budget,
+}
+
+impl Settings {
+    /// An error asked for, whatever it costs.
+    #[must_use]
+    pub fn with_error(error: f32) -> Self {
+        Self { error, budget: Budget::default() }
+    }
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { error: 0.05 }
+        Self::with_error(0.05)
     }
 }
 
@@ -100,7 +112,9 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) reflected: Vec<L::Exitant>,
     pub(crate) settings: Settings,
     pub(crate) stats: Stats,
-    unlit: Vec<Pair>,
+    account: Account,
+    pub(crate) skips: Skips,
+    pub(crate) unlit: Vec<Pair>,
     /// Irradiance through a node's own links, on flat nodes.
     own: Vec<Gathered>,
     /// Light through a node's own links, on nodes that are not flat.
@@ -132,6 +146,11 @@ impl<L: LightField> Solver<L> {
     /// A [`SolveError`] where the scene is empty, some surface, material, light or the error asked for makes no
     /// sense, or light would grow without end ([`SolveError::NoSteadyState`]).
     pub fn new(input: &SceneInput, settings: Settings, field: L) -> Result<Self, SolveError> {
+        Self::skipping(input, settings, field, Skips::ALL)
+    }
+
+    /// [`new`](Self::new) with a say in what is skipped.
+    pub(crate) fn skipping(input: &SceneInput, settings: Settings, field: L, skips: Skips) -> Result<Self, SolveError> {
         let start = Instant::now();
         if !(0.001..=1.0).contains(&settings.error) {
             return Err(SolveError::Error { error: settings.error });
@@ -145,7 +164,7 @@ impl<L: LightField> Solver<L> {
             })
             .unzip();
         steady::check(&scene, |material| field.active(material).unwrap_or(Rgb::ZERO))?;
-        let elements = Elements::build(&scene, |material| field.active(material));
+        let elements = Elements::build(&scene, |material| field.active(material), skips);
         let count = elements.nodes.len();
         let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
         let mut solver = Self {
@@ -168,6 +187,8 @@ impl<L: LightField> Solver<L> {
             reflected: std::iter::repeat_with(L::Exitant::default).take(count).collect(),
             settings,
             stats: Stats { polygons: input.surfaces.len() as u64, ..Stats::default() },
+            account: Account::new(settings.budget, start),
+            skips,
             unlit: vec![Pair { receiver: 0, sender: 0 }],
             own: Vec::new(),
             transfers: Vec::new(),
@@ -188,19 +209,20 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Solves. `watch` is told how far it is every few milliseconds, and may break: then the solution is what there is by
-    /// then, and [`Stats::stopped`] is set. Budgets of time and memory are its business: a link takes 16 bytes, an
-    /// element about 400 and what the extension keeps of it.
+    /// then, and [`Stats::stopped`] is set. Where a [`Budget`] is spent, light settles over what is linked by then, and
+    /// [`Stats::spent`] tells which one it was.
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
         for (pass, looseness) in PASSES.iter().chain(std::iter::repeat(&1.0)).enumerate().take(PASSES.len() + 1) {
-            let last = pass + 1 >= PASSES.len();
             let changed = self.refine(pass, *looseness, &mut stopped, watch);
+            let last = pass + 1 >= PASSES.len();
             let goal = if last { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
             let most = if last { MOST_ITERATIONS } else { 3 };
             if stopped {
                 // New elements have their parents' light.
                 break;
             }
+            let account = self.account;
             for iteration in 0..most {
                 let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
                 let progress = self.progress(Phase::Transport, fraction, *looseness);
@@ -211,16 +233,18 @@ impl<L: LightField> Solver<L> {
                 // Once the light is there, and what is linked is fine enough.
                 let places = last && iteration == if pass < PASSES.len() { 1 } else { 0 };
                 if places {
-                    self.place(ask);
+                    self.place(&mut || if account.is_over() { ControlFlow::Break(()) } else { ask() });
                 }
                 let Some(residual) = self.iterate(pass >= FIRST_REFLECTED, ask) else { break };
                 if self.grows() {
                     self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
                 }
-                if stopped || self.remaining(residual) < goal && (places || iteration > 0) {
+                let settled = self.remaining(residual) < goal && (places || iteration > 0);
+                if stopped || settled || account.is_over() {
                     break;
                 }
             }
+            self.measure();
             if stopped || last && !changed {
                 break;
             }
@@ -229,10 +253,17 @@ impl<L: LightField> Solver<L> {
             // Whenever it was stopped, there is some light.
             self.iterate(false, &mut || ControlFlow::Continue(()));
         }
+        self.measure();
         self.stats.stopped = stopped;
         self.stats.nodes = self.elements.nodes.len() as u64;
         self.stats.leaves = self.elements.patch_leaves().count() as u64;
         self.stats.links = self.links.all().len() as u64;
+    }
+
+    /// Takes note of the memory in use.
+    fn measure(&mut self) {
+        let links = self.links.all().len() as u64;
+        self.stats.bytes = self.account.measure(&self.field, &self.incident, &self.reflected, links);
     }
 
     /// Refines all links to a tolerance; tells whether any pair was split.
@@ -248,6 +279,7 @@ impl<L: LightField> Solver<L> {
             error: LINK_SHARE * self.settings.error * looseness * self.mean_irradiance(),
             area: self.area,
             smallest: SMALLEST_SHARE * self.settings.error.sqrt(),
+            skips: self.skips,
         };
         let error = self.believed_error(looseness);
         self.convergence.restart();
@@ -262,12 +294,13 @@ impl<L: LightField> Solver<L> {
             faint: &self.faint,
         };
         let mut wave_number = 0.0_f32;
-        let refined = refine(&mut light, links, unlit, tolerance, &mut |wave, done| {
+        let refined = refine(&mut light, links, unlit, tolerance, &self.account, &mut |wave, done| {
             wave_number += 1.0;
             let fraction = progress_fraction(pass, 0.8 * wave_number / (wave_number + 8.0));
             watch(&Progress { phase: Phase::Refine, fraction, error, links: wave + done, nodes })
         });
         *stopped |= refined.stopped;
+        self.stats.spent = self.stats.spent.or(refined.spent);
         let count = self.elements.nodes.len();
         self.links = Links::new(refined.links, count);
         self.unlit = refined.unlit;
@@ -283,7 +316,7 @@ impl<L: LightField> Solver<L> {
 
     /// One iteration of the paper: gather, push, reflect, pull. Returns the change of the mean radiosity, relative
     /// to it; `None`, and no change, where `watch` broke before the light was gathered.
-    fn iterate(&mut self, reflects: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Option<f32> {
+    pub(crate) fn iterate(&mut self, reflects: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Option<f32> {
         let before: Vec<Rgb> = self.exitant.irradiance.clone();
         let start = Instant::now();
         if self.gather(watch).is_break() {
@@ -496,14 +529,14 @@ impl<L: LightField> Solver<L> {
         }
     }
 
-    /// Mean irradiance of the surfaces that any light reaches; before there is any, that which the emitted power
+    /// Mean irradiance of the surfaces that any light reaches and that reflect any; before there is any, that which the emitted power
     /// would make if it were spread evenly. The measure of every tolerance.
     fn mean_irradiance(&self) -> f32 {
         let (mut lit, mut area, mut power) = (0.0_f64, 0.0_f64, 0.0_f64);
         for leaf in self.elements.patch_leaves() {
             let (element, leaf) = (&self.elements.nodes[leaf as usize], leaf as usize);
             let irradiance = self.exitant.irradiance[leaf].max_element();
-            if irradiance > 0.0 {
+            if irradiance > 0.0 && element.importance > 0.0 {
                 lit += f64::from(irradiance * element.area);
                 area += f64::from(element.area);
             }

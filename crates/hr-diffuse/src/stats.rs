@@ -1,5 +1,7 @@
 //! Counters of the work done and of the work avoided, and the time that each phase took.
 
+use crate::budget::Spent;
+
 /// Counts and seconds of a solve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stats {
@@ -23,6 +25,10 @@ pub struct Stats {
     pub residuals: Vec<f32>,
     /// Whether it was told to stop before it was done: the solution is what there was by then.
     pub stopped: bool,
+    /// The budget that was spent before the solution had the error asked for: it is a coarser one.
+    pub spent: Option<Spent>,
+    /// Bytes of elements, links and what the extension keeps of them, at the end of the solve.
+    pub bytes: u64,
     /// What was skipped, and why.
     pub skipped: Skipped,
     /// Seconds by phase.

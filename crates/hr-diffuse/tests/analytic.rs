@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 fn solve(input: &SceneInput, error: f32) -> Solution {
-    let mut solver = Solver::new(input, Settings { error }, ()).expect("the scene is sound");
+    let mut solver = Solver::new(input, Settings::with_error(error), ()).expect("the scene is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
     solver.finish(&mut |_| ControlFlow::Continue(()))
 }

@@ -5,7 +5,7 @@ use hr_diffuse::{DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solution, So
 use std::ops::ControlFlow;
 
 fn solve(input: &SceneInput, error: f32) -> Solution {
-    let mut solver = Solver::new(input, Settings { error }, ()).expect("the scene is sound");
+    let mut solver = Solver::new(input, Settings::with_error(error), ()).expect("the scene is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
     solver.finish(&mut |_| ControlFlow::Continue(()))
 }

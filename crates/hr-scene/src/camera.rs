@@ -93,11 +93,11 @@ impl Camera {
         Ok(())
     }
 
-    /// Right, up and forward unit vectors. NaN where the camera does not pass [`check`](Self::check).
+    /// Right, up and forward unit vectors; zero where the camera does not pass [`check`](Self::check).
     #[must_use]
     pub fn frame(&self) -> (DVec3, DVec3, DVec3) {
-        let forward = (DVec3::from(self.target) - DVec3::from(self.eye)).normalize();
-        let right = forward.cross(DVec3::from(self.up)).normalize();
+        let forward = unit(DVec3::from(self.target) - DVec3::from(self.eye));
+        let right = unit(forward.cross(unit(self.up.into())));
         (right, right.cross(forward), forward)
     }
 

@@ -39,3 +39,13 @@ pub enum SceneError {
         known: String,
     },
 }
+
+/// A word of the file in quotes, fit for one line of an error message whatever is in it.
+pub(crate) fn quoted(word: &str) -> String {
+    const LONGEST: usize = 40;
+    let mut text: String = word.chars().take(LONGEST).flat_map(char::escape_debug).collect();
+    if word.chars().nth(LONGEST).is_some() {
+        text.push('…');
+    }
+    format!("'{text}'")
+}

@@ -13,6 +13,7 @@ mod mtl;
 #[cfg(test)]
 mod tests;
 
+use crate::error::quoted;
 use crate::mesh::{Face, MAX_SURFACES, Part, Vertices, merge, place};
 use crate::polygon::{Piece, pieces};
 use crate::warnings::Warnings;
@@ -102,7 +103,7 @@ fn statements(text: &str) -> impl Iterator<Item = (usize, String)> {
 fn number(word: Option<&str>, place: impl FnOnce() -> String) -> Result<f64, SceneError> {
     word.and_then(|w| w.parse().ok()).ok_or_else(|| SceneError::Syntax {
         place: place(),
-        what: word.map_or("a number is missing".to_owned(), |w| format!("'{w}' is no number")),
+        what: word.map_or("a number is missing".to_owned(), |w| format!("{} is no number", quoted(w))),
         mend: "a decimal number would be right".to_owned(),
     })
 }
@@ -291,7 +292,11 @@ impl<'a> Reader<'a> {
                     let what = ["v", "vt", "vn"].get(k).copied().unwrap_or("fourth");
                     return Err(SceneError::Syntax {
                         place: self.place(line),
-                        what: format!("'{word}' has the {what} index '{part}', and {count} are known here"),
+                        what: format!(
+                            "{} has the {what} index {}, and {count} are known here",
+                            quoted(word),
+                            quoted(part)
+                        ),
                         mend: format!("1…{count}, or -1…-{count} from the last one, would be right"),
                     });
                 }

@@ -52,6 +52,9 @@ const LEAST_AREA: f64 = 1e-10;
 /// A corner that turns by less than this (sine) is straight, and left out.
 const STRAIGHT: f64 = 1e-9;
 
+/// Corners this near to each other are one, relative to the polygon's extent: they may coincide once they are placed.
+const REPEATED: f64 = 1e-9;
+
 /// How far a corner of a quadrilateral may lie from the plane of the others, relative to its size: what files
 /// written with six digits leave of a flat one.
 const PLANAR: f64 = 1e-5;
@@ -153,7 +156,7 @@ fn simplify(flat: &[DVec2], kept: &mut Vec<usize>, first: usize) {
         while kept.len() >= first + 2 && is_straight(flat, kept[kept.len() - 2], kept[kept.len() - 1], corner) {
             kept.pop();
         }
-        if kept.len() == first || flat[kept[kept.len() - 1]] != flat[corner] {
+        if kept.len() == first || flat[kept[kept.len() - 1]].distance(flat[corner]) > REPEATED {
             kept.push(corner);
         }
     }
@@ -174,7 +177,8 @@ fn simplify(flat: &[DVec2], kept: &mut Vec<usize>, first: usize) {
 
 fn is_straight(flat: &[DVec2], a: usize, b: usize, c: usize) -> bool {
     let (to, from) = (flat[b] - flat[a], flat[c] - flat[b]);
-    to.perp_dot(from).abs() <= STRAIGHT * to.length() * from.length()
+    let (to_length, from_length) = (to.length(), from.length());
+    to_length.min(from_length) <= REPEATED || to.perp_dot(from).abs() <= STRAIGHT * to_length * from_length
 }
 
 /// Where each loop begins and ends in a list of `count` corners.
@@ -343,6 +347,12 @@ mod tests {
     fn straight_and_repeated_corners_are_left_out() {
         let p = polygon(&[[2.0, 0.0], [4.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [0.0, 2.0], [0.0, 0.0]]);
         assert_eq!(pieces(&p, &[]), Ok(vec![Piece::Quad([2, 3, 4, 6])]), "a square with corners to spare");
+        let near = polygon(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [4.0, 4.0], [1e-30, 4.0], [0.0, 1e-30]]);
+        assert_eq!(
+            pieces(&near, &[]),
+            Ok(vec![Piece::Quad([0, 1, 3, 4])]),
+            "a square with corners as good as repeated"
+        );
         let spike = polygon(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [9.0, 9.0], [4.0, 4.0], [0.0, 4.0]]);
         assert_eq!(pieces(&spike, &[]), Ok(vec![Piece::Quad([0, 1, 4, 5])]), "a square with a spike");
     }

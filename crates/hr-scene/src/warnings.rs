@@ -11,9 +11,9 @@ pub(crate) struct Warnings {
 }
 
 impl Warnings {
-    /// Notes what was mended or left out at a place; equal texts are counted.
+    /// Notes what was mended or left out at a place; equal texts are counted. What decoders say may have several lines.
     pub(crate) fn add(&mut self, text: impl Into<String>, place: impl FnOnce() -> String) {
-        let text = text.into();
+        let text: String = text.into().trim().replace(char::is_control, " ");
         if let Some(&i) = self.index.get(&text) {
             self.list[i].count = self.list[i].count.saturating_add(1);
         } else {

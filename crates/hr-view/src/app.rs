@@ -10,7 +10,7 @@ use crate::solved::Solved;
 use crate::stats::{Times, stats};
 use crate::walkthrough::Walkthrough;
 use crate::window::{self, WindowError, WindowOptions};
-use hr_diffuse::{Phase, Settings};
+use hr_diffuse::{Budget, Phase, Settings};
 use hr_scene::whole_file::write_whole;
 use hr_scene::{Camera, Exposure, ImageKind, Rgb, Scene, SceneError, ToneMap};
 use std::io::Write;
@@ -142,6 +142,7 @@ fn solve(scene: Arc<Scene>, args: &Args, distributions: bool, progress: &Progres
     let (mut error, mut stopped) = (1.0, false);
     // When values at vertices have to be done, after a solve that was stopped.
     let mut latest = None;
+    let patient = |from: Duration| from.mul_f64(1.0 + PATIENCE) + Duration::from_secs(1);
     let watch = &mut |state: &hr_diffuse::Progress| {
         let now = progress.elapsed();
         progress.solving(state);
@@ -150,13 +151,17 @@ fn solve(scene: Arc<Scene>, args: &Args, distributions: bool, progress: &Progres
             if interrupt.is_raised() && !stopped {
                 progress.say("stopping, this shows what there is; Ctrl-C again ends the program");
             }
-            stopped |= interrupt.is_raised() || budget.is_some_and(|budget| now >= budget);
+            // The solver itself keeps to the budget; this is for the final reflection.
+            stopped |= interrupt.is_raised() || budget.is_some_and(|budget| now >= patient(budget));
             return if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         }
-        let latest = *latest.get_or_insert(now.mul_f64(1.0 + PATIENCE) + Duration::from_secs(1));
-        if stopped && now >= latest { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let latest = *latest.get_or_insert(patient(now));
+        let late = stopped || budget.is_some_and(|budget| now >= budget);
+        if late && now >= latest { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let solved = Solved::new(scene, Settings { error: args.error }, distributions, watch)?;
+    let time = budget.map(|budget| budget.saturating_sub(progress.elapsed()));
+    let settings = Settings { error: args.error, budget: Budget { time, ..Budget::default() } };
+    let solved = Solved::new(scene, settings, distributions, watch)?;
     Ok((solved, error))
 }
 

@@ -1,6 +1,7 @@
 //! What `--stats` writes: times, counts, what was skipped and why.
 
 use crate::solved::Solved;
+use hr_diffuse::Spent;
 use serde_json::{Value, json};
 
 /// Seconds that the solver does not know of.
@@ -60,6 +61,12 @@ pub fn stats(solved: &Solved, asked: f32, error: f32, times: &Times) -> Value {
             "sealed_sides": skipped.sealed_sides,
             "converged_leaves": skipped.converged_leaves,
         },
+        "stopped": stats.stopped,
+        "budget_spent": stats.spent.map(|spent| match spent {
+            Spent::Time => "time",
+            Spent::Memory => "memory",
+        }),
+        "solution_bytes": stats.bytes,
         "iterations": stats.iterations,
         "residuals": stats.residuals,
         "peak_bytes": peak_bytes(),

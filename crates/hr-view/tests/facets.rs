@@ -14,7 +14,8 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 fn solved(scene: Scene, error: f32) -> Solved {
-    Solved::new(Arc::new(scene), Settings { error }, true, &mut |_| ControlFlow::Continue(())).expect("a sound scene")
+    Solved::new(Arc::new(scene), Settings::with_error(error), true, &mut |_| ControlFlow::Continue(()))
+        .expect("a sound scene")
 }
 
 fn built_in(name: &str, error: f32) -> Solved {

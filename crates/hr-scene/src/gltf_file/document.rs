@@ -1,6 +1,7 @@
 //! From bytes to a checked document with its buffers, and typed errors for whatever is wrong on the way.
 
 use crate::SceneError;
+use crate::error::quoted;
 use crate::whole_file::read_whole;
 use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{self, Root};
@@ -149,7 +150,11 @@ impl Document {
         }
         let relative =
             percent_decoded(uri).filter(|name| !name.contains(':') && !name.is_empty()).ok_or_else(|| {
-                self.wrong(place, format!("'{uri}' is no relative file name"), "embed the data or lay the file beside")
+                self.wrong(
+                    place,
+                    format!("{} is no relative file name", quoted(uri)),
+                    "embed the data or lay the file beside",
+                )
             })?;
         let path = self.path.parent().unwrap_or(Path::new("")).join(relative);
         read_whole(&path)

@@ -1,6 +1,7 @@
 //! Named contexts: the vertices, colours and materials that a file has defined, and which one is current.
 
-use super::fault::{Fault, fault, quoted};
+use super::fault::{Fault, fault};
+use crate::error::quoted;
 use std::collections::HashMap;
 
 /// Contexts of one kind.

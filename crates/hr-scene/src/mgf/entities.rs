@@ -1,11 +1,12 @@
 //! Colours, properties of materials, and geometry: what their arguments mean, and what is wrong with them.
 
 use super::color::Chromaticity;
-use super::fault::{Fault, count, counted, exactly, fault, number, numbers, quoted};
+use super::fault::{Fault, count, counted, exactly, fault, number, numbers};
 use super::geometry::{Sink, Vertex};
 use super::lexer::File;
 use super::material::Tint;
 use super::reader::Reader;
+use crate::error::quoted;
 use glam::DVec3;
 
 /// Most corners of a polygon: more than fit into the 4096 characters that MGF allows a line to have.

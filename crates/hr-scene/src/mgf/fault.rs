@@ -1,5 +1,7 @@
 //! What is wrong with a statement, and what would be right; the reader adds the place.
 
+use crate::error::quoted;
+
 /// An error without its place.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Fault {
@@ -10,16 +12,6 @@ pub(super) struct Fault {
 /// An error without its place.
 pub(super) fn fault<T>(what: impl Into<String>, mend: impl Into<String>) -> Result<T, Fault> {
     Err(Fault { what: what.into(), mend: mend.into() })
-}
-
-/// A word of the file in quotes, fit for one line of an error message whatever is in it.
-pub(super) fn quoted(word: &str) -> String {
-    const LONGEST: usize = 40;
-    let mut text: String = word.chars().take(LONGEST).flat_map(char::escape_debug).collect();
-    if word.chars().nth(LONGEST).is_some() {
-        text.push('…');
-    }
-    format!("'{text}'")
 }
 
 /// A finite number.

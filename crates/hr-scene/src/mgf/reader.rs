@@ -2,11 +2,12 @@
 
 use super::color::Chromaticity;
 use super::context::Contexts;
-use super::fault::{Fault, fault, numbers, quoted};
+use super::fault::{Fault, fault, numbers};
 use super::geometry::{Vertex, unit};
 use super::lexer::File;
 use super::material::{Definition, Key};
 use super::transform::Transform;
+use crate::error::quoted;
 use crate::warnings::Warnings;
 use crate::{Material, Primaries, Scene, SceneError};
 use glam::{DAffine3, DVec3};

@@ -2,7 +2,8 @@
 //!
 //! All of them keep angles, so that what is round stays round. The rightmost argument acts last.
 
-use super::fault::{Fault, count, fault, number, quoted};
+use super::fault::{Fault, count, fault, number};
+use crate::error::quoted;
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Most instances of one array; a slip of the keyboard should not fill the memory.

@@ -1,0 +1,22 @@
+//! Work that is skipped: all that can be, always. Tests solve without, to prove that nothing is lost by it.
+
+/// What is skipped; [`Skipped`](crate::stats::Skipped) tells how often. Dark senders are not among them: what is left out of
+/// them can be linked afterwards, to see that it brings nothing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Skips {
+    pub(crate) black_receivers: bool,
+    /// Pairs that are proved not to face each other, …
+    pub(crate) facing: bool,
+    /// … and those that hardly do, by samples.
+    pub(crate) averted: bool,
+    pub(crate) sealed_sides: bool,
+    pub(crate) converged_leaves: bool,
+}
+
+impl Skips {
+    pub(crate) const ALL: Self =
+        Self { black_receivers: true, facing: true, averted: true, sealed_sides: true, converged_leaves: true };
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,189 @@
+use super::Skips;
+use crate::hooks::{Arrived, Hierarchy, LightField, NodeId, Transfer};
+use crate::links::{Link, Links};
+use crate::refine::Pair;
+use crate::{Cone, DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solver, Surface};
+use glam::{DVec3, Vec3};
+use std::f32::consts::FRAC_1_PI;
+use std::ops::ControlFlow;
+
+const GREY: u32 = 0;
+const LAMP: u32 = 1;
+const BLACK: u32 = 2;
+/// Reflects on its front alone.
+const SOLID: u32 = 3;
+
+/// A room with a lamp, a box, a ball and a post; a black sheet hangs in it. Nothing but the walls has two sides.
+fn room() -> SceneInput {
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let quad = |corner: DVec3, a: DVec3, b: DVec3| Shape::Quad([corner, corner + a, corner + a + b, corner + b]);
+    let mut shapes = vec![
+        (quad(DVec3::ZERO, x, y), GREY),
+        (quad(z, y, x), GREY),
+        (quad(DVec3::ZERO, y, z), GREY),
+        (quad(x, z, y), GREY),
+        (quad(DVec3::ZERO, z, x), GREY),
+        (quad(y, x, z), GREY),
+        (quad(DVec3::new(0.4, 0.4, 0.9), y * 0.2, x * 0.2), LAMP),
+        (quad(DVec3::new(0.1, 0.7, 0.3), x * 0.3, y * 0.2), BLACK),
+    ];
+    // Its sides and lid; each sees the others' backs alone.
+    let (at, a, b, up) = (DVec3::new(0.2, 0.1, 0.0), x * 0.3, y * 0.25, z * 0.5);
+    let sides = [quad(at, a, up), quad(at + a, b, up), quad(at + a + b, -a, up), quad(at + b, -b, up)];
+    shapes.extend(sides.into_iter().map(|side| (side, SOLID)));
+    shapes.push((quad(at + up, a, b), SOLID));
+    shapes.push((Shape::Sphere { center: DVec3::new(0.75, 0.6, 0.2), radius: 0.15 }, SOLID));
+    let ends = [DVec3::new(0.8, 0.2, 0.0), DVec3::new(0.8, 0.2, 0.6)];
+    shapes.push((Shape::Cone { ends, radii: [0.08; 2] }, SOLID));
+    let surfaces = shapes.into_iter().map(|(shape, material)| Surface::new(shape, material)).collect();
+    let material = |reflectance, exitance, two_sided| DiffuseMaterial {
+        reflectance: Rgb::splat(reflectance),
+        exitance: Rgb::splat(exitance),
+        two_sided,
+    };
+    let materials =
+        vec![material(0.6, 0.0, true), material(0.0, 10.0, false), material(0.0, 0.0, true), material(0.5, 0.0, false)];
+    SceneInput { surfaces, materials, ..SceneInput::default() }
+}
+
+fn solve<L: LightField>(input: &SceneInput, error: f32, field: L, skips: Skips) -> Solver<L> {
+    let mut solver = Solver::skipping(input, Settings::with_error(error), field, skips).expect("the room is sound");
+    solver.solve(&mut |_| ControlFlow::Continue(()));
+    solver
+}
+
+/// Mean radiosity of each surface's front and back, W/m².
+fn radiosities<L: LightField>(solver: &Solver<L>) -> Vec<f32> {
+    let of = |&node: &u32| solver.exitant.radiosity.get(node as usize).map_or(0.0, |b| b.element_sum() / 3.0);
+    solver.elements.surface_nodes.iter().flatten().map(of).collect()
+}
+
+/// All nodes send the same light: to the last bit, or to within a share `rounding` of it.
+fn assert_same<L: LightField>(a: &Solver<L>, b: &Solver<L>, rounding: f32) {
+    assert_eq!(a.elements.nodes.len(), b.elements.nodes.len(), "nodes");
+    for (node, element) in a.elements.nodes.iter().enumerate() {
+        let [with, without] = [a, b].map(|solver| solver.exitant.radiosity[node]);
+        let apart = (with - without).abs().max_element();
+        assert!(apart <= rounding * with.max_element(), "{with} and {without} from {element:?}");
+    }
+}
+
+/// The largest difference between the surfaces of two solutions, in units of the mean radiosity.
+fn difference(before: &[f32], after: &[f32], mean: Rgb) -> f32 {
+    let difference = std::iter::zip(before, after).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    difference / (mean.element_sum() / 3.0)
+}
+
+#[test]
+fn black_receivers_change_nothing() {
+    let with = solve(&room(), 0.1, (), Skips::ALL);
+    let without = solve(&room(), 0.1, (), Skips { black_receivers: false, ..Skips::ALL });
+    assert!(with.stats.skipped.black_receivers > 100, "{:?}", with.stats.skipped);
+    assert_eq!(without.stats.skipped.black_receivers, 0, "none is skipped");
+    assert!(without.links.all().len() > with.links.all().len(), "they have links");
+    assert_same(&with, &without, 0.0);
+}
+
+/// Senders that are dark at first are looked at again; what is left out at the end would bring nothing if all of it were
+/// seen from everywhere.
+#[test]
+fn senders_that_stay_dark_change_nothing() {
+    let [mut with, mut without] = [(); 2].map(|()| solve(&room(), 0.1, (), Skips::ALL));
+    assert!(with.stats.skipped.unlit_senders > 100 && !with.unlit.is_empty(), "{:?}", with.stats.skipped);
+    let link = |pair: &Pair| Link { receiver: pair.receiver, sender: pair.sender, factor: 1.0, visibility: 1.0 };
+    let links = without.links.all().iter().copied().chain(without.unlit.iter().map(link)).collect();
+    without.links = Links::new(links, without.elements.nodes.len());
+    for solver in [&mut with, &mut without] {
+        assert!(solver.iterate(true, &mut || ControlFlow::Continue(())).is_some(), "nobody stops it");
+    }
+    assert_same(&with, &without, 0.0);
+}
+
+#[test]
+fn pairs_that_do_not_face_each_other_change_nothing() {
+    let proved = Skips { averted: false, ..Skips::ALL };
+    let with = solve(&room(), 0.1, (), proved);
+    let without = solve(&room(), 0.1, (), Skips { facing: false, ..proved });
+    assert!(with.stats.skipped.facing > 100, "{:?}", with.stats.skipped);
+    assert!(without.links.all().len() > with.links.all().len(), "they have links");
+    // A place that is compared with what it sees knows senders by their links, those through which nothing comes, too.
+    assert_same(&with, &without, 1e-3);
+}
+
+/// What samples say is no proof; but only what is too little to count is left out because of it.
+#[test]
+fn pairs_that_hardly_face_each_other_change_little() {
+    const ERROR: f32 = 0.1;
+    let with = solve(&room(), ERROR, (), Skips::ALL);
+    let without = solve(&room(), ERROR, (), Skips { averted: false, ..Skips::ALL });
+    let [some, all] = [&with, &without].map(|solver| solver.links.all().len());
+    assert!(some < all, "{some} of {all} links");
+    let apart = difference(&radiosities(&with), &radiosities(&without), with.exitant.radiosity[0]);
+    assert!(apart < 0.2 * ERROR, "{apart} of the mean radiosity");
+}
+
+#[test]
+fn sealed_sides_stay_dark_without_being_left_out() {
+    let with = solve(&room(), 0.05, (), Skips::ALL);
+    let without = solve(&room(), 0.05, (), Skips { sealed_sides: false, ..Skips::ALL });
+    assert_eq!(with.stats.skipped.sealed_sides, 6, "the outside of the room");
+    assert_eq!(without.stats.skipped.sealed_sides, 0, "none is skipped");
+    for (side, radiosity) in radiosities(&without).into_iter().enumerate() {
+        let left_out = with.elements.surface_nodes.as_flattened()[side] == u32::MAX;
+        assert!(!left_out || radiosity == 0.0, "side {side} is left out, and would send {radiosity}");
+    }
+    let apart = difference(&radiosities(&with), &radiosities(&without), with.exitant.radiosity[0]);
+    assert!(apart < 0.05, "{apart} of the mean radiosity");
+}
+
+#[test]
+fn iterations_that_are_left_out_would_change_nothing() {
+    const ERROR: f32 = 0.1;
+    let mut solver = solve(&room(), ERROR, (), Skips::ALL);
+    let before = radiosities(&solver);
+    for _ in 0..50 {
+        let _ = solver.iterate(true, &mut || ControlFlow::Continue(()));
+    }
+    let change = difference(&before, &radiosities(&solver), solver.exitant.radiosity[0]);
+    assert!(change < 0.1 * ERROR, "{change} of the mean radiosity");
+}
+
+/// Diffuse reflection of one material by an extension: radiance is the same in all directions.
+struct Echo {
+    material: u32,
+    albedo: f32,
+}
+
+impl LightField for Echo {
+    type Incident = ();
+    type Exitant = Rgb;
+
+    fn active(&self, material: u32) -> Option<Rgb> {
+        (material == self.material).then_some(Rgb::splat(self.albedo))
+    }
+    fn clear(&self, (): &mut ()) {}
+    fn receive(&self, (): &mut (), _: &Transfer) {}
+    fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], arrived: Arrived) -> Rgb {
+        arrived.irradiance * (self.albedo * FRAC_1_PI)
+    }
+    fn radiance(&self, exitant: &Rgb, _: Vec3) -> Rgb {
+        *exitant
+    }
+    fn radiance_bounds(&self, exitant: &Rgb, _: &Cone) -> (Rgb, Rgb) {
+        (*exitant, *exitant)
+    }
+}
+
+#[test]
+fn leaves_whose_light_has_settled_change_little() {
+    const ERROR: f32 = 0.05;
+    let mut input = room();
+    input.materials[GREY as usize].reflectance = Rgb::splat(0.3);
+    let field = || Echo { material: GREY, albedo: 0.3 };
+    let with = solve(&input, ERROR, field(), Skips::ALL);
+    let without = solve(&input, ERROR, field(), Skips { converged_leaves: false, ..Skips::ALL });
+    assert!(with.stats.skipped.converged_leaves > 1000, "{:?}", with.stats.skipped);
+    assert_eq!(without.stats.skipped.converged_leaves, 0, "none is skipped");
+    let apart = difference(&radiosities(&with), &radiosities(&without), with.exitant.radiosity[0]);
+    assert!(apart < ERROR, "{apart} of the mean radiosity");
+}
