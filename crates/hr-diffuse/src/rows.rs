@@ -4,9 +4,11 @@
 //! Their sum is checked against a handful of rays from the leaf itself, which find out how much of the view is
 //! taken up by senders at all; in an enclosure that is all of it, without noise. So no light is lost or made on the way.
 
+use crate::gather::Group;
 use crate::hooks::LightField;
-use crate::place::Class;
+use crate::hierarchy::Kind;
 use crate::sampling::{hash, point2};
+use crate::sealed::cosine_direction;
 use crate::transport::Light;
 use crate::visibility::Hit;
 use glam::{Vec2, Vec3};
@@ -78,7 +80,7 @@ fn kind<L: LightField>(light: Light<'_, L>, hit: &Hit, own: impl Fn(u32) -> bool
     if light.emitted_most(node) <= 0.0 {
         return None;
     }
-    if Class::of(light, node) == Class::Emitter {
+    if Group::of(light, node) == Group::Emitter {
         return Some(0);
     }
     loop {
@@ -121,12 +123,6 @@ impl Default for Correction {
 }
 
 impl Row {
-    /// What keeps this row from exceeding `most`.
-    pub(crate) fn capped(&self, most: f32) -> Correction {
-        let sum = self.emitters + self.own + self.inherited;
-        Correction { all: if sum > most { most / sum } else { 1.0 }, ..Correction::default() }
-    }
-
     /// What makes this row what was seen: what is uncertain changes first, and emitters, whose links are fine, only where
     /// they take up more than all there is, or less where there is nothing else.
     pub(crate) fn correction(&self, seen: &Seen) -> Correction {
@@ -158,4 +154,68 @@ impl Row {
 /// What is nearest to `row` of all that a share may be of which `seen` was seen.
 fn within_band(row: f32, seen: f32) -> f32 {
     row.clamp((seen - UNCERTAIN).max(0.0), (seen + UNCERTAIN).min(1.0))
+}
+
+/// Sums of form factors times visibility of a leaf, by which its light is balanced.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LeafRow {
+    /// Of emitters.
+    pub(crate) emitters: f32,
+    /// Of other surfaces.
+    pub(crate) rest: f32,
+    /// Share of the leaf that light may reach.
+    pub(crate) exposed: f32,
+}
+
+impl LeafRow {
+    /// Factors for the light of [lights without extent, emitters, others] that make the row no more than what is exposed, or
+    /// that where the scene is closed; and all light that of the exposed part. What emitters lack is not made up for
+    /// where others can, as their links are fine.
+    pub(crate) fn factors(&self, closed: bool) -> [f32; 3] {
+        let Self { emitters, rest, exposed } = *self;
+        if exposed <= 0.0 {
+            return [0.0; 3];
+        }
+        let mut more = 1.0;
+        if closed && rest > 0.0 && exposed >= 1.0 {
+            more = ((1.0 - emitters).max(0.0) / rest).min(MOST_RAISE);
+        }
+        let sum = if closed { emitters + rest * more } else { rest };
+        let least = if closed && exposed >= 1.0 { MOST_RAISE.recip() } else { exposed };
+        if !closed { if crate::sampling::knob("CAP", 1.0) == 0.0 { return [1.0; 3]; } let all = exposed * (0.98 / sum.max(0.98)); return [exposed.recip(), exposed.recip(), all / exposed]; }
+        let all = exposed / sum.max(least);
+        [exposed.recip(), all / exposed, all * more / exposed]
+    }
+}
+
+/// Rays that tell whether a scene is closed.
+const CLOSED_RAYS: u32 = 4096;
+
+/// Whether all that is seen from anywhere sends light: then all form factors of a leaf sum to 1.
+pub(crate) fn is_closed<L: LightField>(light: Light<'_, L>) -> bool {
+    let leaves: Vec<u32> = light.elements.patch_leaves().filter(|&leaf| light.element(leaf).importance > 0.0 && light.exitant.irradiance[leaf as usize] != crate::Rgb::ZERO).collect();
+    let total: f64 = leaves.iter().map(|&leaf| f64::from(light.element(leaf).area)).sum();
+    if total <= 0.0 {
+        return false;
+    }
+    // Points are spread evenly over the area.
+    let (mut passed, mut ray) = (0.0, 0);
+    for leaf in leaves {
+        let element = light.element(leaf);
+        passed += f64::from(element.area) / total;
+        while ray < CLOSED_RAYS && (f64::from(ray) + 0.5) / f64::from(CLOSED_RAYS) < passed {
+            let (u, v) = (point2(0x8e1d, ray), point2(0x77a3, ray));
+            let geometry = &light.scene.surfaces()[element.source as usize];
+            let (x, normal, _) = geometry.sample_area(element.domain, u.x, u.y);
+            let n = if element.kind == Kind::Back { -normal } else { normal };
+            let direction = cosine_direction(n, v.x, v.y);
+            let hit = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, element.source);
+            let sends = hit.and_then(|hit| light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv));
+            if sends.is_none_or(|leaf| light.emitted_most(leaf.0) <= 0.0) {
+                return false;
+            }
+            ray += 1;
+        }
+    }
+    true
 }

@@ -39,3 +39,9 @@ pub fn point2(seed: u32, i: u32) -> Vec2 {
     let shift = Vec2::new(unit(hash(seed, 5)), unit(hash(seed, 6)));
     (shift + PLANE_STEPS * i as f32).fract()
 }
+
+pub(crate) fn knob(name: &'static str, default: f32) -> f32 {
+    static KNOBS: std::sync::OnceLock<std::collections::HashMap<String, f32>> = std::sync::OnceLock::new();
+    let knobs = KNOBS.get_or_init(|| std::env::vars().filter_map(|(k, v)| Some((k, v.parse().ok()?))).collect());
+    knobs.get(name).copied().unwrap_or(default)
+}
