@@ -1,9 +1,8 @@
 //! Budgets of time and memory: where one is spent, refinement ends, and light settles over what is linked by then.
 
 use crate::hierarchy::{Element, Elements};
-use crate::hooks::{LightField, Transfer};
+use crate::hooks::LightField;
 use crate::links::Link;
-use crate::place::{Gathered, Placed};
 use crate::{Facing, Rgb};
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
@@ -45,7 +44,7 @@ const PARTS: u64 = 4;
 pub(crate) struct Account {
     budget: Budget,
     begin: Instant,
-    /// Bytes of the extension per link, when light last was transported.
+    /// Bytes of the extension and of what is arriving, per link, when light last was transported.
     extension: f64,
 }
 
@@ -71,17 +70,18 @@ impl Account {
         self.budget.time.is_some_and(|time| now >= time.as_secs_f64() * (1.0 + SETTLING))
     }
 
-    /// Takes note of what the extension keeps; returns the bytes of it all.
+    /// Takes note of what the extension and the state of what is `arriving` keep; returns the bytes of it all.
     pub(crate) fn measure<L: LightField>(
         &mut self,
         field: &L,
         incident: &[L::Incident],
         reflected: &[L::Exitant],
         links: u64,
+        arriving: u64,
     ) -> u64 {
         let received = incident.par_iter().map(|light| field.incident_bytes(light) as u64);
         let sent = reflected.par_iter().map(|light| field.exitant_bytes(light) as u64);
-        let extension = received.sum::<u64>() + sent.sum::<u64>();
+        let extension = arriving + received.sum::<u64>() + sent.sum::<u64>();
         self.extension = extension as f64 / links.max(1) as f64;
         incident.len() as u64 * node_bytes::<L>() + links * LINK_BYTES + extension
     }
@@ -93,9 +93,7 @@ const LINK_BYTES: u64 = size_of::<Link>() as u64;
 fn node_bytes<L: LightField>() -> u64 {
     // Radiosity, range, irradiance and its last value, directional; facing; whose light it is, gain, peak, brightest.
     let exitant = 6 * size_of::<Rgb>() + size_of::<Facing>() + 4 * size_of::<u32>();
-    // What its links brought, and for which of them it was placed.
-    let arrived = size_of::<Gathered>() + size_of::<Vec<Transfer>>() + size_of::<Placed>() + size_of::<u64>();
-    (size_of::<Element>() + exitant + arrived + size_of::<L::Incident>() + size_of::<L::Exitant>()) as u64
+    (size_of::<Element>() + exitant + size_of::<L::Incident>() + size_of::<L::Exitant>()) as u64
 }
 
 /// What there will be when a wave of refinement is done: nodes, and links with the pairs that may become some.

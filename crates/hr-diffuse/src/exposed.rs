@@ -9,8 +9,8 @@
 
 use crate::geometry::{Domain, Geometry};
 use crate::hierarchy::{Elements, Kind, SceneData};
-use crate::sampling::{hash, point2};
-use crate::sealed::{Side, cosine_direction, is_back, outward};
+use crate::sampling::{cosine_direction, hash, point2};
+use crate::sealed::{Side, is_back, outward};
 use crate::visibility::Region;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;

@@ -1,8 +1,7 @@
 //! Links: who lights whom, through which form factor, how visibly. 16 bytes each, sorted by receiver.
 
-use crate::hierarchy::Elements;
 use rayon::prelude::*;
-use std::hash::{DefaultHasher, Hasher};
+use std::ops::Range;
 
 /// Light passes from `sender` to `receiver`.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -51,24 +50,15 @@ impl Links {
     /// Those that a node receives through.
     #[must_use]
     pub fn of(&self, receiver: u32) -> &[Link] {
-        match self.first.get(receiver as usize..receiver as usize + 2) {
-            Some(range) => &self.all[range[0] as usize..range[1] as usize],
-            None => &[],
-        }
+        &self.all[self.range(receiver)]
     }
 
-    /// By node, a hash of the links that it and its ancestors receive through.
-    pub(crate) fn hashes(&self, elements: &Elements) -> Vec<u64> {
-        let mut hashes = vec![0; elements.nodes.len()];
-        for (node, element) in elements.nodes.iter().enumerate() {
-            let mut hasher = DefaultHasher::new();
-            if node > 0 {
-                hasher.write_u64(hashes[element.parent as usize]);
-            }
-            hasher.write(bytemuck::cast_slice(self.of(node as u32)));
-            hashes[node] = hasher.finish();
+    /// Where in [`all`](Self::all) those are that a node receives through.
+    pub(crate) fn range(&self, receiver: u32) -> Range<usize> {
+        match self.first.get(receiver as usize..receiver as usize + 2) {
+            Some(range) => range[0] as usize..range[1] as usize,
+            None => 0..0,
         }
-        hashes
     }
 
     pub(crate) fn take(&mut self) -> Vec<Link> {

@@ -6,11 +6,11 @@
 //! is renewed where a link carries much of the light.
 
 use crate::Rgb;
+use crate::gather::Group;
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::links::Links;
-use crate::place::{Class, Gathered, Placed};
-use crate::rows::{Row, look_around};
+use crate::rows::{Correction, Row, look_around};
 use crate::sampling::hash;
 use crate::segments::visibility_at;
 use crate::transport::{Light, NEGLIGIBLE};
@@ -321,7 +321,7 @@ fn gather_at<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, uv: V
         node = light.element(node).parent;
     }
     // Light whose visibility is renewed here, and light with the visibility that links have for something larger.
-    let (mut own, mut kept) = (Gathered::default(), Gathered::default());
+    let (mut own, mut kept) = ([Rgb::ZERO; 3], [Rgb::ZERO; 3]);
     let (mut rays, mut row) = (0, Row::default());
     let mut renewed_here: SmallVec<[u32; 64]> = SmallVec::new();
     let seed = hash(seed, 0x51ed);
@@ -335,19 +335,21 @@ fn gather_at<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, uv: V
             rays += count;
             visibility = visibility_at(light, (x, n, element.source), sender, count, seed);
         }
-        let class = Class::of(light, sender);
-        *(if renewed { &mut own } else { &mut kept }).of(class) += irradiance * visibility.abs();
-        *match class {
-            Class::Emitter => &mut row.emitters,
+        let group = Group::of(light, sender);
+        (if renewed { &mut own } else { &mut kept })[group as usize] += irradiance * visibility.abs();
+        *match group {
+            Group::Light => continue,
+            Group::Emitter => &mut row.emitters,
             _ if renewed => &mut row.own,
             _ => &mut row.inherited,
         } += view * visibility.abs();
     }
     renewed_here.sort_unstable();
     let is_own = |sender: u32| renewed_here.binary_search(&sender).is_ok();
-    let seen = look_around(light, element.source, &[(x, n, 1.0)], seed, COVER * element.radius, is_own);
-    let placed = Placed { row: row.correction(&seen), ..Placed::default() };
-    Gathering { irradiance: placed.irradiance(own, kept), rays, covered: seen.covered }
+    let seen = look_around(light, (x, n, element.source), seed, COVER * element.radius, is_own);
+    let Correction { inherited, rest, all } = row.correction(&seen);
+    let irradiance = own[0] + kept[0] + (own[1] + kept[1] + (own[2] + kept[2] * inherited) * rest) * all;
+    Gathering { irradiance, rays, covered: seen.covered }
 }
 
 /// What was gathered at a vertex; nothing where only black surfaces meet.

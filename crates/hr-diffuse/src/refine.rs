@@ -42,6 +42,8 @@ const FACTOR_POINTS: u32 = 16;
 const BETWEEN_WATCHES: usize = 128;
 /// Segments per link: first a few, then as many as its light is worth.
 const FIRST_SEGMENTS: u32 = 4;
+/// So many where elements are near each other: the light that passes varies over them, and its mean errs to one side.
+const NEAR_SEGMENTS: u32 = 16;
 const MOST_SEGMENTS: u32 = 32;
 
 /// Nodes nearer than this many times the sum of their radii may be parts of one convex object, …
@@ -105,7 +107,6 @@ pub(crate) struct Refined {
     pub(crate) visibility_seconds: f64,
     pub(crate) stopped: bool,
     pub(crate) spent: Option<Spent>,
-    pub(crate) changed: bool,
 }
 
 /// Work counters that threads share. Sums of integers: their order does not matter.
@@ -211,7 +212,6 @@ pub(crate) fn refine<L: LightField>(
                 }
             }
         }
-        refined.changed |= !next.is_empty();
         wave = next;
     }
     refined.rays = counters.rays.into_inner();
@@ -408,16 +408,18 @@ fn decide<L: LightField>(
     }
     // What visibility is worth: rays in proportion to the light at stake, and a split where it is uneven.
     let stake = weight * interval.most.min(4.0 * estimate(light, &link));
+    let near = 2.0 * (r.radius + s.radius) > r.center.distance(s.center);
+    let first = if near { NEAR_SEGMENTS } else { FIRST_SEGMENTS };
     let start = Instant::now();
     let mut blocker = u32::MAX;
     let (mut seen, mut total, mut rays) =
-        segments::visibility(light, pair.receiver, pair.sender, 0..FIRST_SEGMENTS, &mut blocker);
-    let worth = (FIRST_SEGMENTS as f32 * stake / tolerance.error) as u32;
+        segments::visibility(light, pair.receiver, pair.sender, 0..first, &mut blocker);
+    let worth = (first as f32 * stake / tolerance.error) as u32;
     let partial = seen > 0.0 && seen < total;
     if !(partial && stake > tolerance.error && !stopped) {
-        let more = worth.clamp(FIRST_SEGMENTS, MOST_SEGMENTS);
-        if more > FIRST_SEGMENTS {
-            let (a, b, c) = segments::visibility(light, pair.receiver, pair.sender, FIRST_SEGMENTS..more, &mut blocker);
+        let more = worth.clamp(first, MOST_SEGMENTS);
+        if more > first {
+            let (a, b, c) = segments::visibility(light, pair.receiver, pair.sender, first..more, &mut blocker);
             seen += a;
             total += b;
             rays += c;

@@ -1,16 +1,15 @@
 //! Row sums: what a point sees of all that sends light adds up to what there is to see, 1 in an enclosure.
 //!
-//! The links of a leaf hold form factors that are means over larger elements, and visibilities from a few segments.
-//! Their sum is checked against a handful of rays from the leaf itself, which find out how much of the view is
-//! taken up by senders at all; in an enclosure that is all of it, without noise. So no light is lost or made on the way.
+//! The links that light a vertex hold visibilities of larger elements, from a few segments. Their sum is checked against a
+//! handful of rays from the vertex itself, which find out how much of the view is taken up by senders at all; in an
+//! enclosure that is all of it, without noise. So no light is lost or made on the way.
 
+use crate::gather::Group;
 use crate::hooks::LightField;
-use crate::place::Class;
-use crate::sampling::{hash, point2};
+use crate::sampling::{cosine_direction, hash, point2};
 use crate::transport::Light;
 use crate::visibility::Hit;
 use glam::{Vec2, Vec3};
-use std::f32::consts::TAU;
 
 /// Sides of the grid of directions that is drawn from at each point.
 const GRID: u32 = 7;
@@ -18,7 +17,7 @@ const GRID: u32 = 7;
 /// stratified rays.
 const UNCERTAIN: f32 = 0.05;
 /// Factors are raised by at most this: where more is missing, it is not known from where.
-const MOST_RAISE: f32 = 1.5;
+pub(crate) const MOST_RAISE: f32 = 1.5;
 /// Of senders that take up this share of the view some ray would meet one.
 const SURELY_SEEN: f32 = 0.12;
 
@@ -33,42 +32,32 @@ pub(crate) struct Seen {
     pub(crate) covered: bool,
 }
 
-/// Looks around from `points`, positions with unit normals on a surface, among which the rays are dealt out. `own` tells
-/// which senders count as the place's own. What is nearer than `near` may cover it.
+/// Looks around from `x` on a surface, with the unit normal `n`. `own` tells which senders count as the place's own. What is
+/// nearer than `near` may cover it.
 pub(crate) fn look_around<L: LightField>(
     light: Light<'_, L>,
-    surface: u32,
-    points: &[(Vec3, Vec3, f32)],
+    (x, n, surface): (Vec3, Vec3, u32),
     seed: u32,
     near: f32,
     own: impl Fn(u32) -> bool,
 ) -> Seen {
-    let (mut hits, mut rays, mut close) = ([0_u16; 3], 0, 0);
-    for (i, &(x, n, _)) in points.iter().enumerate() {
-        let (a, b) = n.any_orthonormal_pair();
-        for cell in 0..GRID * GRID {
-            if cell as usize % points.len() != i {
-                continue;
-            }
-            let jitter = point2(hash(seed, 0x2f1b), cell);
-            let u = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + jitter) / GRID as f32;
-            let (sin, cos) = (TAU * u.x).sin_cos();
-            let direction = (a * cos + b * sin) * u.y.sqrt() + n * (1.0 - u.y).sqrt();
-            rays += 1;
-            let Some(hit) = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface) else {
-                continue;
-            };
-            close += u16::from(hit.t < near);
-            if let Some(kind) = kind(light, &hit, &own) {
-                hits[kind] += 1;
-            }
+    const RAYS: u32 = GRID * GRID;
+    let (mut hits, mut close) = ([0_u32; 3], 0);
+    for cell in 0..RAYS {
+        let jitter = point2(hash(seed, 0x2f1b), cell);
+        let u = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + jitter) / GRID as f32;
+        let direction = cosine_direction(n, u.x, u.y);
+        let Some(hit) = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface) else { continue };
+        close += u32::from(hit.t < near);
+        if let Some(kind) = kind(light, &hit, &own) {
+            hits[kind] += 1;
         }
     }
-    let [emitters, own, inherited] = hits.map(|hits| f32::from(hits) / rays.max(1) as f32);
+    let [emitters, own, inherited] = hits.map(|hits| hits as f32 / RAYS as f32);
     Seen {
         shares: Row { emitters, own, inherited },
-        closed: hits.iter().sum::<u16>() == rays,
-        covered: 10 * close >= 9 * rays,
+        closed: hits.iter().sum::<u32>() == RAYS,
+        covered: 10 * close >= 9 * RAYS,
     }
 }
 
@@ -78,7 +67,7 @@ fn kind<L: LightField>(light: Light<'_, L>, hit: &Hit, own: impl Fn(u32) -> bool
     if light.emitted_most(node) <= 0.0 {
         return None;
     }
-    if Class::of(light, node) == Class::Emitter {
+    if Group::of(light, node) == Group::Emitter {
         return Some(0);
     }
     loop {
@@ -121,12 +110,6 @@ impl Default for Correction {
 }
 
 impl Row {
-    /// What keeps this row from exceeding `most`.
-    pub(crate) fn capped(&self, most: f32) -> Correction {
-        let sum = self.emitters + self.own + self.inherited;
-        Correction { all: if sum > most { most / sum } else { 1.0 }, ..Correction::default() }
-    }
-
     /// What makes this row what was seen: what is uncertain changes first, and emitters, whose links are fine, only where
     /// they take up more than all there is, or less where there is nothing else.
     pub(crate) fn correction(&self, seen: &Seen) -> Correction {

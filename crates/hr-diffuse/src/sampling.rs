@@ -1,7 +1,8 @@
 //! Deterministic, well-spread sample points: an additive recurrence shifted by a hash. No state, no clock; the
 //! irrational steps keep points off the symmetry of patches, where rays would aim at shared edges.
 
-use glam::{Vec2, Vec4};
+use glam::{Vec2, Vec3, Vec4};
+use std::f32::consts::TAU;
 
 /// Steps of the four-dimensional additive recurrence: powers of the reciprocal of the root of x⁵ = x + 1
 /// (M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
@@ -38,4 +39,11 @@ pub fn point4(seed: u32, i: u32) -> Vec4 {
 pub fn point2(seed: u32, i: u32) -> Vec2 {
     let shift = Vec2::new(unit(hash(seed, 5)), unit(hash(seed, 6)));
     (shift + PLANE_STEPS * i as f32).fract()
+}
+
+/// A direction about a unit normal, drawn by its cosine.
+pub(crate) fn cosine_direction(n: Vec3, u: f32, v: f32) -> Vec3 {
+    let (a, b) = n.any_orthonormal_pair();
+    let (sin, cos) = (TAU * u).sin_cos();
+    (a * cos + b * sin) * v.sqrt() + n * (1.0 - v).sqrt()
 }

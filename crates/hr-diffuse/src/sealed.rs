@@ -10,14 +10,13 @@
 
 use crate::geometry::{Aabb, Domain, Geometry};
 use crate::hierarchy::SceneData;
-use crate::sampling::{hash, point2, point4};
+use crate::sampling::{cosine_direction, hash, point2, point4};
 use crate::segments::light_segment;
 use crate::visibility::{NO_BLOCKER, Region};
 use crate::{Light, Rgb};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use smallvec::SmallVec;
-use std::f32::consts::TAU;
 use std::ops::Range;
 
 /// Rays that a group shares in successive rounds; only groups that are still dark take part in the next one, and
@@ -320,13 +319,6 @@ impl<'a> Spots<'a> {
         let known = |spot: u32| (spot != NONE).then_some(spot);
         std::iter::successors(known(self.of_side[side as usize]), move |&spot| known(self.all[spot as usize].next))
     }
-}
-
-/// A direction about a unit normal, drawn by its cosine.
-pub(crate) fn cosine_direction(n: Vec3, u: f32, v: f32) -> Vec3 {
-    let (a, b) = n.any_orthonormal_pair();
-    let (sin, cos) = (TAU * u).sin_cos();
-    (a * cos + b * sin) * v.sqrt() + n * (1.0 - v).sqrt()
 }
 
 /// Whether a point of a surface with normal `n` sees one of those lights without extent that are `wanted`.

@@ -5,11 +5,11 @@ use crate::columns::{FREELY, STRICTLY, gains};
 use crate::convergence::Convergence;
 use crate::error::SolveError;
 use crate::exposed::expose;
+use crate::gather::Gather;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
-use crate::hooks::{LightField, NodeId, Transfer};
+use crate::hooks::LightField;
 use crate::links::Links;
-use crate::place::{Class, Gathered, Placed, place, renewed};
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
 use crate::skips::Skips;
@@ -20,7 +20,6 @@ use crate::twins::twins;
 use crate::visibility::Visibility;
 use crate::{Facing, LightKind, Rgb, SceneInput};
 use glam::DVec3;
-use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -38,8 +37,6 @@ const FAINT_SHARE: f32 = 0.7;
 const CONVERGED_SHARE: f32 = 0.02;
 /// The first pass that reflects the extension's light: before it, there is little light to reflect.
 const FIRST_REFLECTED: usize = 2;
-/// Nodes whose links a thread gathers between two calls of `watch`: some milliseconds.
-const BETWEEN_WATCHES: usize = 1024;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
 
@@ -115,14 +112,8 @@ pub struct Solver<L: LightField = ()> {
     account: Account,
     pub(crate) skips: Skips,
     pub(crate) unlit: Vec<Pair>,
-    /// Irradiance through a node's own links, on flat nodes.
-    own: Vec<Gathered>,
-    /// Light through a node's own links, on nodes that are not flat.
-    transfers: Vec<Vec<Transfer>>,
-    /// By node, for leaves.
-    placed: Vec<Placed>,
-    /// By node: for which links it was placed.
-    placed_for: Vec<u64>,
+    /// What arrives through the links there are.
+    gather: Gather,
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
     /// diffuse light.
     pub(crate) faint: Vec<Rgb>,
@@ -190,10 +181,7 @@ impl<L: LightField> Solver<L> {
             account: Account::new(settings.budget, start),
             skips,
             unlit: vec![Pair { receiver: 0, sender: 0 }],
-            own: Vec::new(),
-            transfers: Vec::new(),
-            placed: Vec::new(),
-            placed_for: Vec::new(),
+            gather: Gather::default(),
             faint,
             strong,
             last_reflected: Vec::new(),
@@ -213,8 +201,8 @@ impl<L: LightField> Solver<L> {
     /// [`Stats::spent`] tells which one it was.
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
-        for (pass, looseness) in PASSES.iter().chain(std::iter::repeat(&1.0)).enumerate().take(PASSES.len() + 1) {
-            let changed = self.refine(pass, *looseness, &mut stopped, watch);
+        for (pass, looseness) in PASSES.iter().enumerate() {
+            self.refine(pass, *looseness, &mut stopped, watch);
             let last = pass + 1 >= PASSES.len();
             let goal = if last { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
             let most = if last { MOST_ITERATIONS } else { 3 };
@@ -223,6 +211,11 @@ impl<L: LightField> Solver<L> {
                 break;
             }
             let account = self.account;
+            let progress = self.progress(Phase::Transport, progress_fraction(pass, 0.8), *looseness);
+            self.prepare(last, &mut || {
+                stopped = stopped || watch(&progress).is_break();
+                if stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
             for iteration in 0..most {
                 let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
                 let progress = self.progress(Phase::Transport, fraction, *looseness);
@@ -230,27 +223,23 @@ impl<L: LightField> Solver<L> {
                     stopped = stopped || watch(&progress).is_break();
                     if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
                 };
-                // Once the light is there, and what is linked is fine enough.
-                let places = last && iteration == if pass < PASSES.len() { 1 } else { 0 };
-                if places {
-                    self.place(&mut || if account.is_over() { ControlFlow::Break(()) } else { ask() });
-                }
                 let Some(residual) = self.iterate(pass >= FIRST_REFLECTED, ask) else { break };
                 if self.grows() {
                     self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
                 }
-                let settled = self.remaining(residual) < goal && (places || iteration > 0);
+                let settled = self.remaining(residual) < goal && iteration > 0;
                 if stopped || settled || account.is_over() {
                     break;
                 }
             }
             self.measure();
-            if stopped || last && !changed {
+            if stopped {
                 break;
             }
         }
         if self.stats.iterations == 0 {
             // Whenever it was stopped, there is some light.
+            self.prepare(false, &mut || ControlFlow::Continue(()));
             self.iterate(false, &mut || ControlFlow::Continue(()));
         }
         self.measure();
@@ -263,17 +252,18 @@ impl<L: LightField> Solver<L> {
     /// Takes note of the memory in use.
     fn measure(&mut self) {
         let links = self.links.all().len() as u64;
-        self.stats.bytes = self.account.measure(&self.field, &self.incident, &self.reflected, links);
+        self.stats.bytes =
+            self.account.measure(&self.field, &self.incident, &self.reflected, links, self.gather.bytes());
     }
 
-    /// Refines all links to a tolerance; tells whether any pair was split.
+    /// Refines all links to a tolerance.
     fn refine(
         &mut self,
         pass: usize,
         looseness: f32,
         stopped: &mut bool,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-    ) -> bool {
+    ) {
         let start = Instant::now();
         let tolerance = Tolerance {
             error: LINK_SHARE * self.settings.error * looseness * self.mean_irradiance(),
@@ -311,7 +301,6 @@ impl<L: LightField> Solver<L> {
         self.stats.rays += refined.rays;
         self.stats.seconds.visibility += refined.visibility_seconds;
         self.stats.seconds.refine += start.elapsed().as_secs_f64();
-        refined.changed
     }
 
     /// One iteration of the paper: gather, push, reflect, pull. Returns the change of the mean radiosity, relative
@@ -375,106 +364,28 @@ impl<L: LightField> Solver<L> {
         }
     }
 
-    /// Every receiver adds up what its links carry, in parallel, each on its own state.
+    /// Finds out how the light of each link reaches the leaves below its receiver: by a look from each leaf itself once links
+    /// are as fine as they will be.
+    fn prepare(&mut self, closely: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) {
+        let start = Instant::now();
+        let error = closely.then_some(self.settings.error);
+        self.gather = Gather::new(self.light(), &self.links, error, watch);
+        self.stats.seconds.transport += start.elapsed().as_secs_f64();
+    }
+
+    /// Every receiver adds up what its links carry.
     fn gather(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> ControlFlow<()> {
-        let count = self.elements.nodes.len();
-        let mut own = std::mem::take(&mut self.own);
-        let mut transfers = std::mem::take(&mut self.transfers);
-        let mut incident = std::mem::take(&mut self.incident);
-        own.resize(count, Gathered::default());
-        transfers.resize_with(count, Vec::new);
-        let (light, links, field) = (self.light(), &self.links, &self.field);
-        let gather = |node: usize, own: &mut Gathered, transfers: &mut Vec<Transfer>, incident: &mut L::Incident| {
-            *own = Gathered::default();
-            transfers.clear();
-            let element = light.element(node as u32);
-            if element.active {
-                field.clear(incident);
-            }
-            let flat = element.is_flat();
-            for link in links.of(node as u32) {
-                let direction = light.direction_to(element.center, link.sender);
-                let visible = link.factor * link.visibility.abs();
-                let irradiance = light.emitted(link.sender, -direction) * visible;
-                if irradiance.max_element() <= 0.0 {
-                    continue;
-                }
-                let transfer = Transfer { sender: NodeId(link.sender), direction, irradiance, oriented: flat };
-                if flat {
-                    *own.of(Class::of(light, link.sender)) += irradiance;
-                } else {
-                    transfers.push(transfer);
-                }
-                if element.active {
-                    field.receive(incident, &transfer);
-                }
-            }
-        };
-        let chunk = BETWEEN_WATCHES * rayon::current_num_threads();
-        let mut answer = ControlFlow::Continue(());
-        for first in (0..count).step_by(chunk) {
-            answer = watch();
-            if answer.is_break() {
-                break;
-            }
-            let part = first..(first + chunk).min(count);
-            let nodes = own[part.clone()].par_iter_mut().zip(&mut transfers[part.clone()]).zip(&mut incident[part]);
-            nodes
-                .enumerate()
-                .with_min_len(64)
-                .for_each(|(i, ((own, transfers), incident))| gather(first + i, own, transfers, incident));
-        }
-        (self.own, self.transfers, self.incident) = (own, transfers, incident);
+        let (mut gather, mut incident) = (std::mem::take(&mut self.gather), std::mem::take(&mut self.incident));
+        let answer = gather.gather(self.light(), &self.links, &mut incident, watch);
+        (self.gather, self.incident) = (gather, incident);
         answer
     }
 
-    /// Hands light down to the leaves: the sum of what their ancestors received. Light on nodes that are not flat
-    /// meets the leaf's own orientation, and its direction and distance are those from the leaf.
+    /// Hands light down to the leaves.
     fn push(&mut self) {
-        let (elements, light) = (&self.elements, self.light());
-        let leaves: Vec<u32> = elements.patch_leaves().collect();
-        let sums: Vec<Rgb> = leaves
-            .par_iter()
-            .with_min_len(64)
-            .map(|&leaf| {
-                let element = light.element(leaf);
-                let mut inherited = Gathered::default();
-                let mut node = leaf;
-                loop {
-                    if node != leaf {
-                        inherited += self.own[node as usize];
-                    }
-                    for transfer in &self.transfers[node as usize] {
-                        let (direction, scale) = renewed(light, transfer.sender.0, element.center, node);
-                        *inherited.of(Class::of(light, transfer.sender.0)) +=
-                            transfer.irradiance * (element.mean_cosine(direction) * scale);
-                    }
-                    if node == 0 {
-                        break;
-                    }
-                    node = elements.nodes[node as usize].parent;
-                }
-                let placed = self.placed.get(leaf as usize).copied().unwrap_or_default();
-                placed.irradiance(self.own[leaf as usize], inherited)
-            })
-            .collect();
-        for (leaf, sum) in leaves.into_iter().zip(sums) {
-            self.exitant.irradiance[leaf as usize] = sum;
+        for (leaf, irradiance) in self.gather.push(self.light(), &self.links) {
+            self.exitant.irradiance[leaf as usize] = irradiance;
         }
-    }
-
-    /// Finds out what the places of the leaves make of the light on their ancestors, where links are new.
-    fn place(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) {
-        let start = Instant::now();
-        let hashes = self.links.hashes(&self.elements);
-        let mut placed = std::mem::take(&mut self.placed);
-        let stale = |leaf: u32| self.placed_for.get(leaf as usize) != Some(&hashes[leaf as usize]);
-        if place(self.light(), &self.links, self.settings.error, stale, &mut placed, watch) {
-            self.placed_for = hashes;
-        }
-        self.placed = placed;
-        self.convergence.restart();
-        self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 
     /// Diffuse radiosity of the leaves, averaged bottom-up with its range and direction.

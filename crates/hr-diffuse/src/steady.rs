@@ -10,8 +10,8 @@
 use crate::error::SolveError;
 use crate::geometry::Domain;
 use crate::hierarchy::SceneData;
-use crate::sampling::{hash, point4};
-use crate::sealed::{Groups, Side, cosine_direction, sees_light};
+use crate::sampling::{cosine_direction, hash, point4};
+use crate::sealed::{Groups, Side, sees_light};
 use crate::{LightKind, Rgb};
 use rayon::prelude::*;
 

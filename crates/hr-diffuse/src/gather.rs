@@ -1,0 +1,204 @@
+//! Gather: every receiver adds up what its links carry.
+
+use crate::Rgb;
+use crate::hierarchy::{Elements, Kind};
+use crate::hooks::{LightField, NodeId, Transfer};
+use crate::leaf_rows::{LeafRow, closed};
+use crate::links::{Link, Links};
+use crate::push::{Push, Spread, visible};
+use crate::transport::Light;
+use glam::Vec2;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+
+/// Links that a thread evaluates between two calls of `watch`: about a millisecond.
+const BETWEEN_WATCHES: usize = 1 << 14;
+
+/// Whose light it is: rows of form factors treat them differently.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Group {
+    /// Lights without extent: no part of the view.
+    Light,
+    /// Parts of surfaces that emit: links to them are fine, since they are bright.
+    Emitter,
+    /// Other parts of surfaces, and clusters.
+    Rest,
+}
+
+impl Group {
+    /// That of a sender.
+    pub(crate) fn of<L: LightField>(light: Light<'_, L>, sender: u32) -> Self {
+        let element = light.element(sender);
+        match element.kind {
+            Kind::Light => Self::Light,
+            Kind::Front if light.scene.materials[element.material as usize].exitance != Rgb::ZERO => Self::Emitter,
+            Kind::Cluster | Kind::Front | Kind::Back => Self::Rest,
+        }
+    }
+}
+
+/// What arrives through the links of a scene.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Gather {
+    /// By link.
+    groups: Vec<Group>,
+    push: Push,
+    /// By leaf, as in `push`: what makes the sum of its form factors what it should be, by group.
+    rows: Vec<[f32; 3]>,
+    /// Irradiance by link.
+    arriving: Vec<Rgb>,
+    /// Irradiance through evenly spread links, by node and group: its own and those of all above it.
+    even: Vec<[Rgb; 3]>,
+}
+
+impl Gather {
+    /// Prepares for a set of links; see [`Push::new`].
+    pub(crate) fn new<L: LightField>(
+        light: Light<'_, L>,
+        links: &Links,
+        error: Option<f32>,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Self {
+        let groups: Vec<Group> = links.all().par_iter().map(|link| Group::of(light, link.sender)).collect();
+        let push = Push::new(light, links, error, watch);
+        // The rows of form factors are what would arrive of unit radiosity.
+        let shares = links.all().par_iter().zip(&push.spreads).map(|(link, spread)| share(light, link, *spread));
+        let shares: Vec<Vec2> = shares.collect();
+        let even = sums(light.elements, links, &groups, &push.spreads, &shares);
+        let closed = if error.is_some() { closed(light, &push.leaves) } else { vec![false; push.leaves.len()] };
+        let row = |index: usize| {
+            let [_, emitters, rest] = push.sum(light, links, index, (&groups, &shares, &even));
+            let exposed = light.elements.exposed(push.leaves[index]);
+            let row = LeafRow { shares: [emitters.x, rest.x], reflected: rest.y, exposed, closed: closed[index] };
+            row.factors()
+        };
+        let rows = (0..push.leaves.len()).into_par_iter().with_min_len(64).map(row).collect();
+        Self { groups, push, rows, arriving: Vec::new(), even: Vec::new() }
+    }
+
+    /// Bytes of all of it.
+    pub(crate) fn bytes(&self) -> u64 {
+        let of = |count: usize, size: usize| (count * size) as u64;
+        of(self.arriving.len(), size_of::<Rgb>() + size_of::<Group>())
+            + of(self.even.len(), size_of::<[Rgb; 3]>())
+            + of(self.rows.len(), size_of::<[f32; 3]>())
+            + self.push.bytes()
+    }
+
+    /// Evaluates all links, and lets the extension receive what they carry.
+    pub(crate) fn gather<L: LightField>(
+        &mut self,
+        light: Light<'_, L>,
+        links: &Links,
+        incident: &mut [L::Incident],
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let chunk = BETWEEN_WATCHES * rayon::current_num_threads();
+        let mut arriving = std::mem::take(&mut self.arriving);
+        arriving.resize(links.all().len(), Rgb::ZERO);
+        let parts = links.all().chunks(chunk).zip(self.push.spreads.chunks(chunk));
+        for (irradiances, (links, spreads)) in arriving.chunks_mut(chunk).zip(parts) {
+            if watch().is_break() {
+                return ControlFlow::Break(());
+            }
+            let evaluated = irradiances.par_iter_mut().zip(links).zip(spreads).with_min_len(256);
+            evaluated.for_each(|((irradiance, link), spread)| *irradiance = carried(light, link, *spread));
+        }
+        self.even = sums(light.elements, links, &self.groups, &self.push.spreads, &arriving);
+        self.arriving = arriving;
+        if light.element(0).active {
+            self.receive(light, links, incident, watch)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Hands what each link carries to the extension, on active receivers.
+    fn receive<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        links: &Links,
+        incident: &mut [L::Incident],
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let chunk = BETWEEN_WATCHES / 16 * rayon::current_num_threads();
+        for (i, incident) in incident.chunks_mut(chunk).enumerate() {
+            if watch().is_break() {
+                return ControlFlow::Break(());
+            }
+            incident.par_iter_mut().enumerate().with_min_len(64).for_each(|(j, incident)| {
+                let node = (i * chunk + j) as u32;
+                let element = light.element(node);
+                if !element.active {
+                    return;
+                }
+                light.field.clear(incident);
+                for at in links.range(node) {
+                    let (sender, irradiance) = (links.all()[at].sender, self.arriving[at]);
+                    if irradiance.max_element() > 0.0 {
+                        let direction = light.direction_to(element.center, sender);
+                        let oriented = element.is_flat();
+                        let transfer = Transfer { sender: NodeId(sender), direction, irradiance, oriented };
+                        light.field.receive(incident, &transfer);
+                    }
+                }
+            });
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Irradiance of all leaves.
+    pub(crate) fn push<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, Rgb)> {
+        let leaf = |index: usize| {
+            let sums = self.push.sum(light, links, index, (&self.groups, &self.arriving, &self.even));
+            let irradiance = sums.iter().zip(self.rows[index]).map(|(sum, factor)| *sum * factor).sum();
+            (self.push.leaves[index], irradiance)
+        };
+        (0..self.push.leaves.len()).into_par_iter().with_min_len(64).map(leaf).collect()
+    }
+}
+
+/// Irradiance that a link carries.
+fn carried<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> Rgb {
+    let visible = link.factor * visible(link, spread);
+    if visible <= 0.0 {
+        return Rgb::ZERO;
+    }
+    let direction = light.direction_to(light.element(link.receiver).center, link.sender);
+    light.emitted(link.sender, -direction) * visible
+}
+
+/// What a link carries of unit radiosity, and of what its sender reflects of it.
+fn share<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> Vec2 {
+    let sender = light.element(link.sender);
+    let mut carried = link.factor * visible(link, spread);
+    if sender.kind == Kind::Cluster {
+        let direction = light.direction_to(light.element(link.receiver).center, link.sender);
+        carried *= sender.mean_cosine(-direction);
+    }
+    carried * Vec2::new(1.0, if sender.active { sender.importance.min(1.0) } else { sender.reflectance.max_element() })
+}
+
+/// What the evenly spread links of each node and of all above it carry in sum, by group.
+fn sums<T: Copy + Default + Send + Sync + std::ops::AddAssign>(
+    elements: &Elements,
+    links: &Links,
+    groups: &[Group],
+    spreads: &[Spread],
+    arriving: &[T],
+) -> Vec<[T; 3]> {
+    let sum = |node: usize| {
+        let mut sums = [T::default(); 3];
+        for at in links.range(node as u32).filter(|&at| spreads[at] == Spread::Even) {
+            sums[groups[at] as usize] += arriving[at];
+        }
+        sums
+    };
+    let mut sums: Vec<[T; 3]> = (0..elements.nodes.len()).into_par_iter().with_min_len(256).map(sum).collect();
+    for node in 1..sums.len() {
+        let above = sums[elements.nodes[node].parent as usize];
+        for (sum, above) in sums[node].iter_mut().zip(above) {
+            *sum += above;
+        }
+    }
+    sums
+}

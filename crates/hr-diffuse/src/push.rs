@@ -1,0 +1,308 @@
+//! Push: the light that inner nodes received is handed down to the leaves below them.
+//!
+//! A link holds the mean over the node that it ends at; a leaf in a corner of it sees more of the sender or less, from
+//! another side. So every leaf has a weight for each link above it: what the sender brings to the leaf's own place, over
+//! what it brings to the node. The weights stay the same until links change, and are kept where they fit. Links that bring
+//! next to nothing are spread evenly over flat nodes, and by orientation and distance alone over others.
+
+use crate::NodeId;
+use crate::gather::Group;
+use crate::hierarchy::{Element, Kind, SceneData};
+use crate::hooks::{Hierarchy, LightField};
+use crate::links::{Link, Links};
+use crate::sampling::hash;
+use crate::segments::visibility_at;
+use crate::transport::{Light, NEGLIGIBLE};
+use glam::Vec3;
+use rayon::prelude::*;
+use smallvec::{SmallVec, smallvec};
+use std::ops::ControlFlow;
+
+/// No more weights than these are kept: 256 MB. In larger scenes those of the leaves beyond are found anew in each
+/// iteration.
+const MOST_KEPT: usize = 1 << 26;
+/// Links that bring less than this share of the error asked for, relative to all that arrives, are not looked at closely.
+const FAINT_SHARE: f32 = 0.03;
+/// Leaves and senders whose radii together are below this share of their distance are far from each other.
+const FAR: f32 = 0.25;
+/// Leaves get no more than this times what a link brings on average. Surfaces that lie in one another's plane hide each
+/// other by turns, which no mean visibility can tell.
+const MOST_WEIGHT: f32 = 8.0;
+
+/// Rays for a link that brings all light of a leaf; others in proportion, within limits.
+const RAYS: f32 = 64.0;
+const MOST_RAYS: f32 = 16.0;
+/// Links none of whose segments was free let so much through, of which each leaf finds out what is true.
+const LEAST_VISIBLE: f32 = 0.05;
+
+/// Leaves whose weights a thread finds between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 32;
+
+/// How a link's light is spread over the leaves below its receiver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Spread {
+    /// Evenly: the same irradiance for all.
+    Even,
+    /// By orientation and distance from the sender's middle.
+    Plain,
+    /// By what the sender brings to each leaf.
+    Exact,
+}
+
+/// The leaves, and what light on their ancestors means to them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Push {
+    pub(crate) leaves: Vec<u32>,
+    /// By link.
+    pub(crate) spreads: Vec<Spread>,
+    /// Relative error of the solution.
+    error: f32,
+    /// By link: what it brings if it is wholly visible, where it is looked at closely (sum of channels).
+    means: Vec<f32>,
+    /// Where the weights of each leaf begin; as many leaves as have kept ones, and the end of the last.
+    first: Vec<usize>,
+    /// By leaf, then by node from the leaf up to the root, then by those links of the node that are not spread evenly.
+    weights: Vec<f32>,
+}
+
+impl Push {
+    /// Finds the weights of the leaves, for a solution with the given relative error; where there is none, and where `watch`
+    /// breaks, by orientation and distance alone.
+    pub(crate) fn new<L: LightField>(
+        light: Light<'_, L>,
+        links: &Links,
+        error: Option<f32>,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Self {
+        let leaves: Vec<u32> = light.elements.patch_leaves().collect();
+        let spreads = links.all().par_iter().with_min_len(256).map(|link| spread(light, link, error));
+        let (spreads, means) = spreads.unzip();
+        let mut push =
+            Self { leaves, spreads, error: error.unwrap_or_default(), means, first: vec![0], weights: Vec::new() };
+        // How many weights a leaf has, by node: its own and those of all above it.
+        let mut counts = vec![0_u32; light.elements.nodes.len()];
+        for (node, element) in light.elements.nodes.iter().enumerate() {
+            let own = push.spreads[links.range(node as u32)].iter().filter(|s| **s != Spread::Even).count() as u32;
+            counts[node] = own + if node > 0 { counts[element.parent as usize] } else { 0 };
+        }
+        for &leaf in &push.leaves {
+            let end = push.first[push.first.len() - 1] + counts[leaf as usize] as usize;
+            if end > MOST_KEPT {
+                break;
+            }
+            push.first.push(end);
+        }
+        let mut weights = vec![0.0; push.first[push.first.len() - 1]];
+        let mut parts: Vec<(u32, &mut [f32])> = Vec::with_capacity(push.first.len());
+        let mut rest = weights.as_mut_slice();
+        for (range, &leaf) in push.first.windows(2).zip(&push.leaves) {
+            let (part, after) = rest.split_at_mut(range[1] - range[0]);
+            parts.push((leaf, part));
+            rest = after;
+        }
+        let chunk = if error.is_some() { BETWEEN_WATCHES * rayon::current_num_threads() } else { parts.len().max(1) };
+        for part in parts.chunks_mut(chunk) {
+            if error.is_some() && watch().is_break() {
+                return Self::new(light, links, None, watch);
+            }
+            part.par_iter_mut().with_min_len(4).for_each(|(leaf, weights)| {
+                let mut slots = weights.iter_mut();
+                push.each(light, links, *leaf, |_, weight| {
+                    if let Some(slot) = slots.next() {
+                        *slot = weight();
+                    }
+                });
+            });
+        }
+        push.weights = weights;
+        push
+    }
+
+    /// Bytes of all of it.
+    pub(crate) fn bytes(&self) -> u64 {
+        (self.weights.len() * size_of::<f32>()
+            + self.leaves.len() * (size_of::<u32>() + size_of::<usize>())
+            + self.spreads.len() * size_of::<Spread>()) as u64
+    }
+
+    /// Calls `visit` with every link above a leaf that is not spread evenly, and with what finds its weight there.
+    fn each<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        links: &Links,
+        leaf: u32,
+        mut visit: impl FnMut(usize, &dyn Fn() -> f32),
+    ) {
+        let place = Place::new(light, leaf, self.error);
+        let mut node = leaf;
+        loop {
+            for at in links.range(node) {
+                if self.spreads[at] != Spread::Even {
+                    visit(at, &|| place.weight(light, &links.all()[at], (self.spreads[at], self.means[at])));
+                }
+            }
+            if node == 0 {
+                return;
+            }
+            node = light.element(node).parent;
+        }
+    }
+
+    /// The sum of what arrives at the leaf at an index of `leaves`, by group: through evenly spread links, summed up by
+    /// node in `even`, and through the others, by link in `arriving`.
+    pub(crate) fn sum<L: LightField, T: Copy + std::ops::AddAssign + std::ops::Mul<f32, Output = T>>(
+        &self,
+        light: Light<'_, L>,
+        links: &Links,
+        index: usize,
+        (groups, arriving, even): (&[Group], &[T], &[[T; 3]]),
+    ) -> [T; 3] {
+        let leaf = self.leaves[index];
+        let mut sums = even[leaf as usize];
+        let Some(range) = self.first.get(index..index + 2) else {
+            self.each(light, links, leaf, |at, weight| sums[groups[at] as usize] += arriving[at] * weight());
+            return sums;
+        };
+        let mut weights = self.weights[range[0]..range[1]].iter();
+        let mut node = leaf;
+        loop {
+            for at in links.range(node) {
+                if self.spreads[at] != Spread::Even
+                    && let Some(&weight) = weights.next()
+                {
+                    sums[groups[at] as usize] += arriving[at] * weight;
+                }
+            }
+            if node == 0 {
+                return sums;
+            }
+            node = light.element(node).parent;
+        }
+    }
+}
+
+/// How a link's light is to be spread, and what it brings if it is wholly visible.
+fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -> (Spread, f32) {
+    let receiver = light.element(link.receiver);
+    let even = if receiver.is_flat() { Spread::Even } else { Spread::Plain };
+    let Some(error) = error.filter(|_| !receiver.is_flat() || receiver.child_count > 0) else { return (even, 0.0) };
+    let direction = light.direction_to(receiver.center, link.sender);
+    let mean = light.emitted(link.sender, -direction).element_sum() * link.factor;
+    let faint = FAINT_SHARE * error * light.exitant.irradiance[link.receiver as usize].element_sum();
+    let closely = mean > 0.0 && mean * visible(link, Spread::Exact) >= faint;
+    (if closely { Spread::Exact } else { even }, mean)
+}
+
+/// A leaf, and the points that stand for it.
+struct Place {
+    leaf: u32,
+    points: SmallVec<[(Vec3, Vec3, f32); 4]>,
+    /// Senders that bring less than this are not resolved into parts (largest channel), …
+    negligible: f32,
+    /// … and links that bring less are not looked at closely (sum of channels).
+    faint: f32,
+}
+
+impl Place {
+    fn new<L: LightField>(light: Light<'_, L>, leaf: u32, error: f32) -> Self {
+        let points = sample_points(light.scene, light.element(leaf));
+        let irradiance = light.exitant.irradiance[leaf as usize];
+        let negligible = NEGLIGIBLE * irradiance.max_element();
+        Self { leaf, points, negligible, faint: FAINT_SHARE * error * irradiance.element_sum() }
+    }
+
+    /// What a link brings to the leaf over what it brings to its receiver: `mean` if it were wholly visible.
+    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, (spread, mean): (Spread, f32)) -> f32 {
+        let element = light.element(self.leaf);
+        let plain = || {
+            if light.element(link.receiver).is_flat() {
+                return 1.0;
+            }
+            let (direction, scale) = renewed(light, link.sender, element.center, link.receiver);
+            element.mean_cosine(direction) * scale
+        };
+        if spread != Spread::Exact {
+            return plain();
+        }
+        let visible = visible(link, spread);
+        // A leaf that is small or far is told apart by its orientation; so is one that gets next to nothing.
+        let sender = light.element(link.sender);
+        let apart = sender.center.distance_squared(element.center);
+        let reach = element.radius + sender.radius;
+        let far = reach * reach < FAR * FAR * apart;
+        if far {
+            let plain = plain();
+            if mean * visible * plain < self.faint {
+                return plain * link.visibility.abs() / visible;
+            }
+        }
+        let here = if element.is_flat() || !far {
+            let at = |&(x, n, weight): &(Vec3, Vec3, f32)| {
+                weight * light.arriving_at(x, n, link.sender, self.negligible).0.element_sum()
+            };
+            self.points.iter().map(at).sum::<f32>()
+        } else {
+            let direction = light.direction_to(element.center, link.sender);
+            let (irradiance, _) = light.arriving_at(element.center, direction, link.sender, self.negligible);
+            irradiance.element_sum() * element.mean_cosine(direction)
+        };
+        if here <= 0.0 {
+            return 0.0;
+        }
+        let mut weight = (here / mean).min(MOST_WEIGHT);
+        if link.visibility >= 0.0 {
+            weight *= self.seen(light, link, here * visible) / visible;
+        }
+        weight
+    }
+
+    /// Share of a link's sender that the leaf sees, by as many rays as what it brings is worth.
+    fn seen<L: LightField>(&self, light: Light<'_, L>, link: &Link, brings: f32) -> f32 {
+        let irradiance = light.exitant.irradiance[self.leaf as usize].element_sum();
+        let rays = (RAYS * brings / irradiance.max(f32::MIN_POSITIVE)).clamp(1.0, MOST_RAYS) as u32;
+        let (surface, seed) = (light.element(self.leaf).source, hash(self.leaf, link.sender));
+        let center = light.element(link.sender).center;
+        let faces = |&&(x, n, _): &&(Vec3, Vec3, f32)| (center - x).dot(n) > 0.0;
+        let mut facing: SmallVec<[(Vec3, Vec3, f32); 4]> = self.points.iter().filter(faces).copied().collect();
+        if facing.is_empty() {
+            facing.clone_from(&self.points);
+        }
+        // Few rays are dealt to some of the points.
+        let looks = (rays as usize).min(facing.len());
+        let look = |i: usize| {
+            let (x, n, _) = facing[(seed as usize + i) % facing.len()];
+            visibility_at(light, (x, n, surface), link.sender, rays / looks as u32, seed)
+        };
+        (0..looks).map(look).sum::<f32>() / looks as f32
+    }
+}
+
+/// What a link lets through: what its segments found, but not nothing where each leaf looks for itself.
+pub(crate) fn visible(link: &Link, spread: Spread) -> f32 {
+    let least = if spread == Spread::Exact { LEAST_VISIBLE } else { 0.0 };
+    link.visibility.abs().max(least)
+}
+
+/// Direction and change of irradiance of a link's light as seen from a point inside of the node that received it.
+fn renewed<L: LightField>(light: Light<'_, L>, sender: u32, at: Vec3, node: u32) -> (Vec3, f32) {
+    let direction = light.direction_to(at, sender);
+    if light.elements.is_distant(NodeId(sender)) {
+        return (direction, 1.0);
+    }
+    let center = light.element(sender).center;
+    let before = light.element(node).center.distance_squared(center);
+    let now = at.distance_squared(center);
+    // Near large senders the inverse square law ends; a factor of four is more than refinement leaves.
+    (direction, (before / now.max(1e-12)).clamp(0.25, 4.0))
+}
+
+/// Points, normals and weights (sum 1) that stand for a leaf: its middle where it is flat, four of a curved one.
+fn sample_points(scene: &SceneData, element: &Element) -> SmallVec<[(Vec3, Vec3, f32); 4]> {
+    if element.is_flat() {
+        return smallvec![(element.center, element.normals.axis, 1.0)];
+    }
+    let geometry = &scene.surfaces()[element.source as usize];
+    let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
+    let points = geometry.quadrature(element.domain);
+    points.into_iter().map(|(uv, weight)| (geometry.point(uv), geometry.normal(uv) * side, weight)).collect()
+}
