@@ -1,5 +1,6 @@
 //! Budgets of time and memory: where one is spent, refinement ends, and light settles over what is linked by then.
 
+use crate::gather;
 use crate::hierarchy::{Element, Elements};
 use crate::hooks::LightField;
 use crate::links::Link;
@@ -44,7 +45,7 @@ const PARTS: u64 = 4;
 pub(crate) struct Account {
     budget: Budget,
     begin: Instant,
-    /// Bytes of the extension and of what is arriving, per link, when light last was transported.
+    /// Bytes of the extension and of weights, per link, when light last was transported.
     extension: f64,
 }
 
@@ -59,6 +60,12 @@ impl Account {
         self.budget.memory.is_some_and(|memory| bytes() > memory)
     }
 
+    /// Bytes that are left for weights, which need not be kept.
+    pub(crate) fn room<L: LightField>(&self, nodes: u64, links: u64) -> u64 {
+        let taken = nodes * node_bytes::<L>() + links * LINK_BYTES;
+        self.budget.memory.map_or(u64::MAX, |memory| memory.saturating_sub(taken))
+    }
+
     /// Whether it is too late to refine.
     pub(crate) fn is_late(&self) -> bool {
         self.budget.time.is_some_and(|time| self.begin.elapsed() >= time)
@@ -70,30 +77,31 @@ impl Account {
         self.budget.time.is_some_and(|time| now >= time.as_secs_f64() * (1.0 + SETTLING))
     }
 
-    /// Takes note of what the extension and the state of what is `arriving` keep; returns the bytes of it all.
+    /// Takes note of what the extension keeps, and of the bytes of weights of links on leaves; returns the bytes of it all.
     pub(crate) fn measure<L: LightField>(
         &mut self,
         field: &L,
         incident: &[L::Incident],
         reflected: &[L::Exitant],
         links: u64,
-        arriving: u64,
+        weights: u64,
     ) -> u64 {
         let received = incident.par_iter().map(|light| field.incident_bytes(light) as u64);
         let sent = reflected.par_iter().map(|light| field.exitant_bytes(light) as u64);
-        let extension = arriving + received.sum::<u64>() + sent.sum::<u64>();
+        let extension = weights + received.sum::<u64>() + sent.sum::<u64>();
         self.extension = extension as f64 / links.max(1) as f64;
         incident.len() as u64 * node_bytes::<L>() + links * LINK_BYTES + extension
     }
 }
 
-const LINK_BYTES: u64 = size_of::<Link>() as u64;
+/// Bytes of a link and of what arrives through it.
+const LINK_BYTES: u64 = (size_of::<Link>() + gather::LINK_BYTES) as u64;
 
 /// Bytes that a node takes in the solver, without what the extension keeps elsewhere.
 fn node_bytes<L: LightField>() -> u64 {
     // Radiosity, range, irradiance and its last value, directional; facing; whose light it is, gain, peak, brightest.
     let exitant = 6 * size_of::<Rgb>() + size_of::<Facing>() + 4 * size_of::<u32>();
-    (size_of::<Element>() + exitant + size_of::<L::Incident>() + size_of::<L::Exitant>()) as u64
+    (size_of::<Element>() + exitant + gather::NODE_BYTES + size_of::<L::Incident>() + size_of::<L::Exitant>()) as u64
 }
 
 /// What there will be when a wave of refinement is done: nodes, and links with the pairs that may become some.

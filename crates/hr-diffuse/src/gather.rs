@@ -5,14 +5,18 @@ use crate::hierarchy::{Elements, Kind};
 use crate::hooks::{LightField, NodeId, Transfer};
 use crate::leaf_rows::{LeafRow, closed};
 use crate::links::{Link, Links};
-use crate::push::{Push, Spread, visible};
+use crate::push::{self, Push, Spread, visible};
 use crate::transport::Light;
-use glam::Vec2;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
 /// Links that a thread evaluates between two calls of `watch`: about a millisecond.
 const BETWEEN_WATCHES: usize = 1 << 14;
+
+/// Bytes that are kept for each link, …
+pub(crate) const LINK_BYTES: usize = size_of::<Rgb>() + size_of::<Group>() + push::LINK_BYTES;
+/// … and for each node: its evenly spread light, and as much as leaves have.
+pub(crate) const NODE_BYTES: usize = size_of::<[Rgb; 3]>() + size_of::<[f32; 3]>() + push::LEAF_BYTES;
 
 /// Whose light it is: rows of form factors treat them differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,32 +61,29 @@ impl Gather {
         light: Light<'_, L>,
         links: &Links,
         error: Option<f32>,
+        room: u64,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
         let groups: Vec<Group> = links.all().par_iter().map(|link| Group::of(light, link.sender)).collect();
-        let push = Push::new(light, links, error, watch);
+        let push = Push::new(light, links, error, room, watch);
         // The rows of form factors are what would arrive of unit radiosity.
         let shares = links.all().par_iter().zip(&push.spreads).map(|(link, spread)| share(light, link, *spread));
-        let shares: Vec<Vec2> = shares.collect();
+        let shares: Vec<f32> = shares.collect();
         let even = sums(light.elements, links, &groups, &push.spreads, &shares);
         let closed = if error.is_some() { closed(light, &push.leaves) } else { vec![false; push.leaves.len()] };
         let row = |index: usize| {
             let [_, emitters, rest] = push.sum(light, links, index, (&groups, &shares, &even));
             let exposed = light.elements.exposed(push.leaves[index]);
-            let row = LeafRow { shares: [emitters.x, rest.x], reflected: rest.y, exposed, closed: closed[index] };
+            let row = LeafRow { shares: [emitters, rest], exposed, closed: closed[index] };
             row.factors()
         };
         let rows = (0..push.leaves.len()).into_par_iter().with_min_len(64).map(row).collect();
         Self { groups, push, rows, arriving: Vec::new(), even: Vec::new() }
     }
 
-    /// Bytes of all of it.
-    pub(crate) fn bytes(&self) -> u64 {
-        let of = |count: usize, size: usize| (count * size) as u64;
-        of(self.arriving.len(), size_of::<Rgb>() + size_of::<Group>())
-            + of(self.even.len(), size_of::<[Rgb; 3]>())
-            + of(self.rows.len(), size_of::<[f32; 3]>())
-            + self.push.bytes()
+    /// Bytes of the weights that are kept.
+    pub(crate) fn weight_bytes(&self) -> u64 {
+        self.push.weight_bytes()
     }
 
     /// Evaluates all links, and lets the extension receive what they carry.
@@ -167,15 +168,18 @@ fn carried<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> R
     light.emitted(link.sender, -direction) * visible
 }
 
-/// What a link carries of unit radiosity, and of what its sender reflects of it.
-fn share<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> Vec2 {
+/// What a link carries of unit radiosity, from senders that have any.
+fn share<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> f32 {
     let sender = light.element(link.sender);
-    let mut carried = link.factor * visible(link, spread);
-    if sender.kind == Kind::Cluster {
-        let direction = light.direction_to(light.element(link.receiver).center, link.sender);
-        carried *= sender.mean_cosine(-direction);
+    if light.emitted_most(link.sender) <= 0.0 {
+        return 0.0;
     }
-    carried * Vec2::new(1.0, if sender.active { sender.importance.min(1.0) } else { sender.reflectance.max_element() })
+    let visible = link.factor * visible(link, spread);
+    if sender.kind != Kind::Cluster {
+        return visible;
+    }
+    let direction = light.direction_to(light.element(link.receiver).center, link.sender);
+    visible * sender.mean_cosine(-direction)
 }
 
 /// What the evenly spread links of each node and of all above it carry in sum, by group.

@@ -1,5 +1,5 @@
 //! Row sums of leaves: in an enclosure the form factors of each leaf sum to 1, so no light is lost or made on the way;
-//! elsewhere what comes back to a leaf of the light around it is less than that light.
+//! nowhere to more, so that light dies out wherever reflectances are below 1.
 
 use crate::Rgb;
 use crate::hierarchy::Kind;
@@ -14,8 +14,6 @@ use rayon::prelude::*;
 pub(crate) struct LeafRow {
     /// Of emitters, and of other surfaces.
     pub(crate) shares: [f32; 2],
-    /// The same of the others times what they reflect: what comes back of light that all of them have.
-    pub(crate) reflected: f32,
     /// Share of the leaf that light may reach.
     pub(crate) exposed: f32,
     /// Whether all that is seen from the leaf sends light.
@@ -23,9 +21,9 @@ pub(crate) struct LeafRow {
 }
 
 impl LeafRow {
-    /// Factors for the light of [lights without extent, emitters, others] that make the row 1 where it is known to be, and
-    /// let light die out elsewhere; all light that reaches a leaf is that of its exposed part. What emitters lack is not made
-    /// up for where others can, as their links are fine.
+    /// Factors for the light of [lights without extent, emitters, others] that make the row 1 where it is known to be, and no
+    /// more than what is exposed elsewhere; the exposed part gets all of it. Others change first, as links to emitters are
+    /// fine.
     pub(crate) fn factors(&self) -> [f32; 3] {
         let [emitters, rest] = self.shares;
         if self.exposed <= 0.0 {
@@ -36,13 +34,12 @@ impl LeafRow {
             let all = (emitters + rest * more).max(MOST_RAISE.recip()).recip();
             return [1.0, all, all * more];
         }
-        let fading = (MOST_REFLECTED * self.exposed / self.reflected.max(f32::MIN_POSITIVE)).min(1.0);
-        [1.0, 1.0, fading].map(|factor| factor / self.exposed)
+        let limited = |share: f32, most: f32| (most.max(0.0) / share.max(f32::MIN_POSITIVE)).min(1.0);
+        let (all, rest) = (limited(emitters, self.exposed), limited(rest, self.exposed - emitters));
+        [1.0, all, rest].map(|factor| factor / self.exposed)
     }
 }
 
-/// What the light that a leaf sees is reflected by; of more, light would grow without end.
-const MOST_REFLECTED: f32 = 0.98;
 /// Rays that tell whether a side of a surface sees nothing but senders: at least so many, …
 const CLOSED_RAYS: u32 = 32;
 /// … and so many for each leaf.

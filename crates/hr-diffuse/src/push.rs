@@ -18,8 +18,8 @@ use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
 
-/// No more weights than these are kept: 256 MB. In larger scenes those of the leaves beyond are found anew in each
-/// iteration.
+/// No more weights than these are kept: 256 MB. In larger scenes the leaves beyond have weights by orientation and distance
+/// alone, which are found anew in each iteration.
 const MOST_KEPT: usize = 1 << 26;
 /// Links that bring less than this share of the error asked for, relative to all that arrives, are not looked at closely.
 const FAINT_SHARE: f32 = 0.03;
@@ -35,6 +35,10 @@ const MOST_RAYS: f32 = 16.0;
 /// Links none of whose segments was free let so much through, of which each leaf finds out what is true.
 const LEAST_VISIBLE: f32 = 0.05;
 
+/// Bytes that are kept for each link, …
+pub(crate) const LINK_BYTES: usize = size_of::<Spread>() + size_of::<f32>();
+/// … and for each leaf, beside its weights.
+pub(crate) const LEAF_BYTES: usize = size_of::<u32>() + size_of::<usize>();
 /// Leaves whose weights a thread finds between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 32;
 
@@ -67,11 +71,13 @@ pub(crate) struct Push {
 
 impl Push {
     /// Finds the weights of the leaves, for a solution with the given relative error; where there is none, and where `watch`
-    /// breaks, by orientation and distance alone.
+    /// breaks, by orientation and distance alone. The weights that are kept take
+    /// no more than `room` bytes.
     pub(crate) fn new<L: LightField>(
         light: Light<'_, L>,
         links: &Links,
         error: Option<f32>,
+        room: u64,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
         let leaves: Vec<u32> = light.elements.patch_leaves().collect();
@@ -85,9 +91,10 @@ impl Push {
             let own = push.spreads[links.range(node as u32)].iter().filter(|s| **s != Spread::Even).count() as u32;
             counts[node] = own + if node > 0 { counts[element.parent as usize] } else { 0 };
         }
+        let kept = MOST_KEPT.min((room / size_of::<f32>() as u64) as usize);
         for &leaf in &push.leaves {
             let end = push.first[push.first.len() - 1] + counts[leaf as usize] as usize;
-            if end > MOST_KEPT {
+            if end > kept {
                 break;
             }
             push.first.push(end);
@@ -103,13 +110,13 @@ impl Push {
         let chunk = if error.is_some() { BETWEEN_WATCHES * rayon::current_num_threads() } else { parts.len().max(1) };
         for part in parts.chunks_mut(chunk) {
             if error.is_some() && watch().is_break() {
-                return Self::new(light, links, None, watch);
+                return Self::new(light, links, None, room, watch);
             }
             part.par_iter_mut().with_min_len(4).for_each(|(leaf, weights)| {
                 let mut slots = weights.iter_mut();
-                push.each(light, links, *leaf, |_, weight| {
+                push.each(light, links, *leaf, |place, at| {
                     if let Some(slot) = slots.next() {
-                        *slot = weight();
+                        *slot = place.weight(light, &links.all()[at], (push.spreads[at], push.means[at]));
                     }
                 });
             });
@@ -118,27 +125,19 @@ impl Push {
         push
     }
 
-    /// Bytes of all of it.
-    pub(crate) fn bytes(&self) -> u64 {
-        (self.weights.len() * size_of::<f32>()
-            + self.leaves.len() * (size_of::<u32>() + size_of::<usize>())
-            + self.spreads.len() * size_of::<Spread>()) as u64
+    /// Bytes of the weights that are kept.
+    pub(crate) fn weight_bytes(&self) -> u64 {
+        size_of_val(self.weights.as_slice()) as u64
     }
 
-    /// Calls `visit` with every link above a leaf that is not spread evenly, and with what finds its weight there.
-    fn each<L: LightField>(
-        &self,
-        light: Light<'_, L>,
-        links: &Links,
-        leaf: u32,
-        mut visit: impl FnMut(usize, &dyn Fn() -> f32),
-    ) {
+    /// Calls `visit` with a leaf's place and every link above it that is not spread evenly.
+    fn each<L: LightField>(&self, light: Light<'_, L>, links: &Links, leaf: u32, mut visit: impl FnMut(&Place, usize)) {
         let place = Place::new(light, leaf, self.error);
         let mut node = leaf;
         loop {
             for at in links.range(node) {
                 if self.spreads[at] != Spread::Even {
-                    visit(at, &|| place.weight(light, &links.all()[at], (self.spreads[at], self.means[at])));
+                    visit(&place, at);
                 }
             }
             if node == 0 {
@@ -160,7 +159,10 @@ impl Push {
         let leaf = self.leaves[index];
         let mut sums = even[leaf as usize];
         let Some(range) = self.first.get(index..index + 2) else {
-            self.each(light, links, leaf, |at, weight| sums[groups[at] as usize] += arriving[at] * weight());
+            self.each(light, links, leaf, |place, at| {
+                let weight = place.plain(light, &links.all()[at], self.spreads[at]);
+                sums[groups[at] as usize] += arriving[at] * weight;
+            });
             return sums;
         };
         let mut weights = self.weights[range[0]..range[1]].iter();
@@ -211,19 +213,23 @@ impl Place {
         Self { leaf, points, negligible, faint: FAINT_SHARE * error * irradiance.element_sum() }
     }
 
-    /// What a link brings to the leaf over what it brings to its receiver: `mean` if it were wholly visible.
-    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, (spread, mean): (Spread, f32)) -> f32 {
-        let element = light.element(self.leaf);
-        let plain = || {
-            if light.element(link.receiver).is_flat() {
-                return 1.0;
-            }
-            let (direction, scale) = renewed(light, link.sender, element.center, link.receiver);
-            element.mean_cosine(direction) * scale
-        };
-        if spread != Spread::Exact {
-            return plain();
+    /// What a link brings to the leaf over what it brings to its receiver, by orientation and distance alone.
+    fn plain<L: LightField>(&self, light: Light<'_, L>, link: &Link, spread: Spread) -> f32 {
+        let known = link.visibility.abs() / visible(link, spread).max(f32::MIN_POSITIVE);
+        if light.element(link.receiver).is_flat() {
+            return known;
         }
+        let element = light.element(self.leaf);
+        let (direction, scale) = renewed(light, link.sender, element.center, link.receiver);
+        element.mean_cosine(direction) * scale * known
+    }
+
+    /// The same as asked for; `mean` is what the link would bring to its receiver if it were wholly visible.
+    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, (spread, mean): (Spread, f32)) -> f32 {
+        if spread != Spread::Exact {
+            return self.plain(light, link, spread);
+        }
+        let element = light.element(self.leaf);
         let visible = visible(link, spread);
         // A leaf that is small or far is told apart by its orientation; so is one that gets next to nothing.
         let sender = light.element(link.sender);
@@ -231,9 +237,9 @@ impl Place {
         let reach = element.radius + sender.radius;
         let far = reach * reach < FAR * FAR * apart;
         if far {
-            let plain = plain();
+            let plain = self.plain(light, link, spread);
             if mean * visible * plain < self.faint {
-                return plain * link.visibility.abs() / visible;
+                return plain;
             }
         }
         let here = if element.is_flat() || !far {

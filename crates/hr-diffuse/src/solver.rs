@@ -253,7 +253,7 @@ impl<L: LightField> Solver<L> {
     fn measure(&mut self) {
         let links = self.links.all().len() as u64;
         self.stats.bytes =
-            self.account.measure(&self.field, &self.incident, &self.reflected, links, self.gather.bytes());
+            self.account.measure(&self.field, &self.incident, &self.reflected, links, self.gather.weight_bytes());
     }
 
     /// Refines all links to a tolerance.
@@ -366,10 +366,11 @@ impl<L: LightField> Solver<L> {
 
     /// Finds out how the light of each link reaches the leaves below its receiver: by a look from each leaf itself once links
     /// are as fine as they will be.
-    fn prepare(&mut self, closely: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) {
+    pub(crate) fn prepare(&mut self, closely: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         let start = Instant::now();
         let error = closely.then_some(self.settings.error);
-        self.gather = Gather::new(self.light(), &self.links, error, watch);
+        let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
+        self.gather = Gather::new(self.light(), &self.links, error, room, watch);
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 

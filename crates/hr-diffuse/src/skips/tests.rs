@@ -94,6 +94,7 @@ fn senders_that_stay_dark_change_nothing() {
     let links = without.links.all().iter().copied().chain(without.unlit.iter().map(link)).collect();
     without.links = Links::new(links, without.elements.nodes.len());
     for solver in [&mut with, &mut without] {
+        solver.prepare(true, &mut || ControlFlow::Continue(()));
         assert!(solver.iterate(true, &mut || ControlFlow::Continue(())).is_some(), "nobody stops it");
     }
     assert_same(&with, &without, 0.0);
