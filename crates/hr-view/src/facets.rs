@@ -13,12 +13,22 @@ use std::collections::HashMap;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-/// A chord of a curved surface spans at most this angle (radians, 8°) …
-const FINE: f32 = 0.14;
-/// … unless it leaves the surface by less than this (unit space: 0.5 mm in a room of 10 m) …
-const FLAT_ENOUGH: f32 = 5e-5;
-/// … and then at most this (radians, 20°).
-const COARSE: f32 = 0.35;
+/// How round curved surfaces are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Roundness {
+    /// A chord of a curved surface spans at most this angle (radians) …
+    pub fine: f32,
+    /// … unless it leaves the surface by less than this (share of the scene's size) …
+    pub flat_enough: f32,
+    /// … and then at most this (radians).
+    pub coarse: f32,
+}
+
+impl Roundness {
+    /// 8°, or 20° within 0.5 mm in a room of 10 m.
+    pub const SMOOTH: Self = Self { fine: 0.14, flat_enough: 5e-5, coarse: 0.35 };
+}
+
 /// Edges this near to their surface (unit space) are never cut: rounding bends very short ones at random.
 const NEGLIGIBLE: f32 = 1e-6;
 /// An edge is halved at most so often: a full turn to less than a degree and a half.
@@ -39,8 +49,8 @@ pub struct Source {
 
 /// Makes the triangles that show a solution, and for each of [`DisplayMesh::glossy`] where its light comes from.
 #[must_use]
-pub fn facets(scene: &Scene, solution: &Solution<GlossyField>) -> (DisplayMesh, Vec<Source>) {
-    let mut maker = Maker::new(scene, solution);
+pub fn facets(scene: &Scene, solution: &Solution<GlossyField>, roundness: Roundness) -> (DisplayMesh, Vec<Source>) {
+    let mut maker = Maker::new(scene, solution, roundness);
     for leaf in solution.elements.patch_leaves() {
         maker.leaf(leaf);
     }
@@ -81,6 +91,7 @@ struct Look<'a> {
 struct Maker<'a> {
     scene: &'a Scene,
     solution: &'a Solution<GlossyField>,
+    roundness: Roundness,
     mesh: DisplayMesh,
     sources: Vec<Source>,
     /// Triangles per batch.
@@ -98,7 +109,7 @@ struct Maker<'a> {
 }
 
 impl<'a> Maker<'a> {
-    fn new(scene: &'a Scene, solution: &'a Solution<GlossyField>) -> Self {
+    fn new(scene: &'a Scene, solution: &'a Solution<GlossyField>, roundness: Roundness) -> Self {
         let mut textures: Vec<Texture> = Vec::new();
         let texture_of = scene.materials.iter().map(|material| {
             let Some(texture) = &material.texture else { return 0 };
@@ -117,6 +128,7 @@ impl<'a> Maker<'a> {
         Self {
             scene,
             solution,
+            roundness,
             batches: vec![Vec::new(); textures.len() + 1],
             mesh: DisplayMesh { textures, ..mesh },
             sources: Vec::new(),
@@ -223,7 +235,8 @@ impl<'a> Maker<'a> {
             if length > 0.0 { (off - chord * (off.dot(chord) / (length * length))).length() } else { off.length() };
         // An arc of a small angle t over a chord of length 1 is t/8 high.
         let angle = if length > 0.0 { 8.0 * distance / length } else { f32::INFINITY };
-        if distance < NEGLIGIBLE || angle < if distance < FLAT_ENOUGH { COARSE } else { FINE } {
+        let Roundness { fine, flat_enough, coarse } = self.roundness;
+        if distance < NEGLIGIBLE || angle < if distance < flat_enough { coarse } else { fine } {
             return None;
         }
         // Adding zero makes −0 the same as 0.

@@ -26,7 +26,7 @@ fn mistakes_are_status_1_and_one_line() {
         (&["--camera", "no-such-camera.json"], "no-such-camera.json"),
         (&["--image", "picture.gif"], ".png"),
         (&["--error", "2"], "0.001"),
-        (&["--html", "a.html"], "not available yet"),
+        (&["furnace", "--html", "no/such/folder/a.html"], "no/such/folder/a.html"),
         (&["--mode", "gather", "--image", "a.png"], "not available yet"),
         (&["furnace", "--image", "no/such/folder/a.png"], "no/such/folder/a.png"),
         (&["furnace", "--error", "0.9", "--frames", "/dev/null/frames"], "/dev/null/frames"),

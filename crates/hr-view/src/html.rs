@@ -1,0 +1,214 @@
+//! One self-contained file that walks through a solution in any browser.
+//!
+//! The page shows what the window shows, by the same steps: diffuse light is a number per vertex; glossy light is
+//! evaluated at the vertices from the directional distributions of the leaves around them, in a vertex shader, whenever
+//! the eye has moved. Exposure, filmic curve and sRGB encoding happen per pixel with the window's own constants.
+//!
+//! # What is given up for the size
+//! - Round surfaces have fewer triangles ([`ROUNDNESS`]).
+//! - Distributions are coarsened until few enough values are left, and quantised (module `directions`).
+//! - Positions are rounded to a millionth of the scene's size, colours to 9 bits, normals to 0.004°, the weights of
+//!   the distributions around a vertex to 1/255.
+//!
+//! # Layout
+//! After the viewer comes one script element with base64 text of a gzip file (whose checksum tells a damaged page from a
+//! sound one): a JSON header and sections of bytes, which the viewer turns into vertex buffers and textures.
+
+mod colors;
+mod directions;
+mod images;
+mod payload;
+mod vertices;
+
+use crate::ViewError;
+use crate::display::{DisplayMesh, up_of};
+use crate::facets::{Roundness, Source, facets};
+use crate::solved::Solved;
+use crate::window::lists::{VertexList, split};
+use crate::window::tone::BRIGHTEST;
+use crate::window::{Curve, Tone};
+use base64::engine::general_purpose::STANDARD;
+use base64::write::EncoderWriter;
+use directions::Shine;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use glossy_ext::haar::{Haar, Known, Refinement};
+use hr_diffuse::Rgb;
+use hr_scene::Camera;
+use hr_scene::whole_file::write_whole;
+use payload::Payload;
+use serde::Serialize;
+use std::collections::HashMap;
+use std::f32::consts::FRAC_1_PI;
+use std::io::{self, Write};
+use std::path::Path;
+use vertices::Lattice;
+
+/// How round surfaces are: 11°, or 45° within 2 mm in a room of 10 m.
+const ROUNDNESS: Roundness = Roundness { fine: 0.2, flat_enough: 2e-4, coarse: 0.8 };
+/// At most so many distributions are evaluated for a vertex; the weakest are left out.
+const MOST_SHARES: usize = 12;
+
+/// What the page's script reads first.
+#[derive(Serialize)]
+struct Facts<'a> {
+    name: &'a str,
+    cameras: &'a [(String, Camera)],
+    up: [f64; 3],
+    origin: [f64; 3],
+    lattice: Lattice,
+    to_srgb: [f32; 9],
+    curve: [f32; 5],
+    brightest: f32,
+    lists: [vertices::List; 2],
+    textures: Vec<images::Picture>,
+    floor: f32,
+    growth: f32,
+    most: i32,
+    max_level: u8,
+}
+
+/// Writes the page of a solution whose distributions have been made, whole or not at all.
+///
+/// # Errors
+/// [`ViewError::Scene`] with `path` where it cannot be written.
+pub fn write(solved: &Solved, path: &Path) -> Result<(), ViewError> {
+    let (mesh, sources) = facets(&solved.scene, &solved.solution, ROUNDNESS);
+    Ok(write_whole(path, |out| page(solved, &mesh, &sources, out))?)
+}
+
+/// The viewer with the solution in it.
+fn page(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut impl Write) -> io::Result<()> {
+    const PAGE: &str = include_str!("html/viewer.html");
+    let parts = [
+        ("<!-- style -->", include_str!("html/viewer.css")),
+        ("<!-- glossy vertex -->", include_str!("html/glossy.vert")),
+        ("<!-- scene vertex -->", include_str!("html/scene.vert")),
+        ("<!-- scene fragment -->", include_str!("html/scene.frag")),
+        ("<!-- unpack -->", include_str!("html/unpack.js")),
+        ("<!-- walker -->", include_str!("html/walker.js")),
+        ("<!-- picture -->", include_str!("html/picture.js")),
+        ("<!-- viewer -->", include_str!("html/viewer.js")),
+    ];
+    let page = parts.iter().fold(PAGE.to_owned(), |page, (place, text)| page.replacen(place, text, 1));
+    let (before, after) = page.split_once("<!-- solution -->").unwrap_or((&page, ""));
+    out.write_all(before.as_bytes())?;
+    let mut base64 = EncoderWriter::new(&mut *out, &STANDARD);
+    let mut gzip = GzEncoder::new(&mut base64, Compression::best());
+    solution(solved, mesh, sources, &mut gzip)?;
+    gzip.finish()?;
+    base64.finish()?;
+    drop(base64);
+    out.write_all(after.as_bytes())
+}
+
+/// Header and sections.
+fn solution(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut impl Write) -> io::Result<()> {
+    let tone = Tone::for_mesh(mesh);
+    let Curve { numerator: [a, b], denominator: [c, d, e] } = tone.curve;
+    let lists = split(mesh);
+    let lattice = Lattice::of(mesh);
+    let mut payload = Payload::default();
+    let names = ["diffuse", "glossy"];
+    let lists_facts = [0, 1].map(|i| vertices::add(&mut payload, names[i], mesh, &lists[i], &lattice, tone.exposure));
+    shine(&mut payload, solved, mesh, sources, &lists[1], tone.exposure);
+    let textures = mesh.textures.iter().enumerate().map(|(i, texture)| images::add(&mut payload, i, texture));
+    let facts = Facts {
+        name: &solved.scene.name,
+        cameras: &solved.scene.cameras,
+        up: up_of(&solved.scene.cameras).to_array(),
+        origin: mesh.origin.to_array(),
+        lattice,
+        to_srgb: tone.to_srgb.to_cols_array(),
+        curve: [a, b, c, d, e],
+        brightest: BRIGHTEST,
+        lists: lists_facts,
+        textures: textures.collect::<io::Result<_>>()?,
+        floor: directions::FLOOR,
+        growth: directions::GROWTH,
+        most: directions::MOST,
+        max_level: directions::MAX_LEVEL,
+    };
+    payload.write(&facts, out)
+}
+
+/// The distributions around the vertices of the glossy list, with their weights.
+fn shine(
+    payload: &mut Payload,
+    solved: &Solved,
+    mesh: &DisplayMesh,
+    sources: &[Source],
+    list: &VertexList,
+    exposure: f32,
+) {
+    let source_of: HashMap<u32, &Source> = std::iter::zip(mesh.glossy.iter().copied(), sources).collect();
+    let mut index: HashMap<u32, u32> = HashMap::new();
+    let mut leaves = Vec::new();
+    let (mut counts, mut members, mut weights) = (Vec::new(), Vec::new(), Vec::new());
+    for vertex in &list.vertices {
+        let shares = source_of.get(vertex).map_or_else(Vec::new, |source| shares(solved, source));
+        counts.push(shares.len() as u8);
+        for (leaf, weight) in shares {
+            members.push(*index.entry(leaf).or_insert_with(|| {
+                leaves.push(leaf);
+                leaves.len() as u32 - 1
+            }));
+            weights.push(weight);
+        }
+    }
+    let normals = list.vertices.iter().map(|&vertex| vertices::packed_normal(mesh.normals[vertex as usize]));
+    payload.words("glossy.normals", &normals.collect::<Vec<_>>());
+    payload.bytes("glossy.counts", &counts);
+    payload.steps("glossy.leaves", members);
+    payload.bytes("glossy.weights", &weights);
+    let solution = &solved.solution;
+    let elements = leaves.iter().map(|&leaf| &solution.elements.nodes[leaf as usize]);
+    let axes: Vec<u32> = elements.clone().map(|element| vertices::packed_normal(element.normals.axis)).collect();
+    payload.words("leaf.axes", &axes);
+    // Those that are carried as diffuse light are the same in all directions.
+    let even: Vec<Option<Haar>> = leaves
+        .iter()
+        .map(|&leaf| {
+            let here = leaf as usize;
+            solution.reflected[here].is_empty().then(|| {
+                let albedo = hr_diffuse::LightField::active(&solution.field, solution.elements.nodes[here].material);
+                let light = solution.exitant.irradiance[here] * albedo.unwrap_or(Rgb::ZERO) * FRAC_1_PI;
+                Haar::project(&Refinement { min_level: 0, ..Refinement::default() }, &Known::NOTHING, |_| light).haar
+            })
+        })
+        .collect();
+    let flat: Vec<u8> =
+        std::iter::zip(elements, &even).map(|(element, even)| u8::from(element.is_flat() || even.is_some())).collect();
+    payload.bytes("leaf.flat", &flat);
+    let shines: Vec<Shine<'_>> = std::iter::zip(&leaves, &even)
+        .map(|(&leaf, even)| {
+            let material = solution.elements.nodes[leaf as usize].material;
+            let diffuse = solved.scene.materials[material as usize].reflector.diffuse();
+            let beside = diffuse * solution.exitant.irradiance[leaf as usize] * FRAC_1_PI;
+            Shine { haar: even.as_ref().unwrap_or(&solution.reflected[leaf as usize]), beside }
+        })
+        .collect();
+    directions::add(payload, &shines, exposure);
+}
+
+/// The leaves around a vertex and their weights, as [`glossy::interpolated`](crate::glossy::interpolated) has them,
+/// relative to the largest.
+fn shares(solved: &Solved, source: &Source) -> Vec<(u32, u8)> {
+    let solution = &solved.solution;
+    let mut shares: Vec<(u32, f32)> = Vec::new();
+    for &(vertex, share) in source.corners.iter().filter(|(_, share)| *share > 0.0) {
+        let around = solution.vertices.leaves_around(vertex);
+        for &leaf in around {
+            let weight = solution.elements.exposed(leaf) * share / around.len() as f32;
+            match shares.iter_mut().find(|(known, _)| *known == leaf) {
+                Some((_, sum)) => *sum += weight,
+                None => shares.push((leaf, weight)),
+            }
+        }
+    }
+    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    shares.truncate(MOST_SHARES);
+    let largest = shares.first().map_or(0.0, |share| share.1);
+    let scaled = shares.into_iter().map(|(leaf, weight)| (leaf, (weight / largest * 255.0).round() as u8));
+    scaled.filter(|(_, weight)| *weight > 0).collect()
+}
