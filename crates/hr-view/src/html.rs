@@ -44,8 +44,8 @@ use std::io::{self, Write};
 use std::path::Path;
 use vertices::Lattice;
 
-/// How round surfaces are: 11°, or 45° within 2 mm in a room of 10 m.
-const ROUNDNESS: Roundness = Roundness { fine: 0.2, flat_enough: 2e-4, coarse: 0.8 };
+/// How round surfaces are: 14°, or 45° within 3 mm in a room of 10 m.
+const ROUNDNESS: Roundness = Roundness { fine: 0.25, flat_enough: 3e-4, coarse: 0.8 };
 /// At most so many distributions are evaluated for a vertex; the weakest are left out.
 const MOST_SHARES: usize = 12;
 

@@ -70,7 +70,7 @@ class Picture {
     this.tables = {
       shares: this.table(scene.shares, gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT, 1),
       leaves: this.table(scene.distributions.leaves, gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 4),
-      nodes: this.table(scene.distributions.nodes, gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT, 2),
+      nodes: this.table(scene.distributions.nodes.subarray(0, scene.distributions.filled), gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT, 2),
       values: this.table(scene.distributions.values, gl.RGB9_E5, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV, 1),
     };
     this.textures = scene.pictures.map((picture, i) => this.texture(picture, scene.facts.textures[i]));

@@ -10,7 +10,11 @@ async function unpack(text) {
   }
   let bytes;
   try {
-    const packed = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
+    const letters = atob(text.trim());
+    const packed = new Uint8Array(letters.length);
+    for (let i = 0; i < packed.length; i++) {
+      packed[i] = letters.charCodeAt(i);
+    }
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
     bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   } catch (error) {
@@ -102,160 +106,175 @@ class Colors {
   }
 }
 
-// Numbers that grow.
-class List {
-  constructor(Type, size) {
-    this.array = new Type(size);
-    this.length = 0;
-  }
-
-  // Room for so many more.
-  reserve(more) {
-    if (this.length + more > this.array.length) {
-      const larger = new this.array.constructor(2 * (this.length + more));
-      larger.set(this.array);
-      this.array = larger;
-    }
-  }
-
-  get all() {
-    return this.array.subarray(0, this.length);
-  }
-}
-
 const NO_VERTEX = 0x7fff;
 
 // Which of corners 0, 1, 2 and midpoints 3, 4, 5 are the corners of each child; the ends of the edge of each midpoint.
 const CHILDREN = [[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]];
 const ENDS = [[1, 2], [2, 0], [0, 1]];
 
-// Puts the distributions of all leaves together: the nodes and values that the shader walks through.
-function unpackDistributions(sections, facts) {
-  const [faces, children, flat] = ["faces", "children", "leaf.flat"].map((name) => sections.bytes(name));
-  const axes = sections.words("leaf.axes");
-  const channels = ["green", "red", "blue"].map((name) => sections.bytes(name));
-  const large = sections.words("large");
-  const colors = new Colors(facts);
-  const count = channels[0].length;
-  const values = new Uint32Array(count);
-  const leaves = new Uint32Array(4 * faces.length);
-  const nodes = new List(Uint32Array, 4 * children.length);
-  let [firstValue, nextChildren, nextLarge] = [0, 0, 0];
+// Puts distributions together, one after the other: the nodes and values that the shader walks through.
+class Distributions {
+  constructor(sections, facts) {
+    [this.faces, this.children, this.flat] = ["faces", "children", "leaf.flat"].map((name) => sections.bytes(name));
+    this.axes = sections.words("leaf.axes");
+    this.channels = ["green", "red", "blue"].map((name) => sections.bytes(name));
+    this.large = sections.words("large");
+    this.colors = new Colors(facts);
+    this.values = new Uint32Array(this.channels[0].length);
+    this.leaves = new Uint32Array(4 * this.faces.length);
+    this.nodes = new Uint32Array(4 * this.children.length + 64);
+    [this.filled, this.firstValue, this.nextChildren, this.nextLarge] = [0, 0, 0, 0];
+    this.met = 1;
+    // Of the vertices of the leaf at hand: numbers (green, red and blue less green), and positions on the octahedron in
+    // steps of the finest level.
+    this.numbers = [0, 1, 2].map(() => new Int32Array(NO_VERTEX));
+    this.positions = [0, 1, 2].map(() => new Int16Array(NO_VERTEX));
+    const unit = this.unit = 1 << facts.max_level;
+    [[unit, 0, 0], [-unit, 0, 0], [0, unit, 0], [0, -unit, 0], [0, 0, unit], [0, 0, -unit]].forEach((position, vertex) => {
+      position.forEach((x, k) => { this.positions[k][vertex] = x; });
+    });
+    // Its vertices by position; an entry counts if its stamp is the leaf's number.
+    this.side = 2 * unit + 1;
+    this.stamps = new Int32Array(2 * this.side ** 2).fill(-1);
+    this.vertexAt = new Uint16Array(2 * this.side ** 2);
+    // Its triangles: corners and midpoints of each; which children are divided, −1 for triangles that are not themselves.
+    this.divided = { six: new Uint16Array(6 * NO_VERTEX), mask: new Int8Array(NO_VERTEX), count: 0 };
+    this.kept = { six: new Uint16Array(6 * NO_VERTEX), mask: new Int8Array(NO_VERTEX), count: 0 };
+    for (this.leaf = 0; this.leaf < this.faces.length; this.leaf++) {
+      this.divide();
+      this.layOut();
+    }
+  }
 
-  // Numbers of the values of one leaf, green first, red and blue less green.
-  const numbers = [0, 1, 2].map(() => new Int32Array(NO_VERTEX));
-  // Positions of its vertices on the octahedron, in steps of the finest level.
-  const [px, py, pz] = [0, 1, 2].map(() => new Int16Array(NO_VERTEX));
-  // Vertices by position. An entry counts if its stamp is that of the leaf.
-  const unit = 1 << facts.max_level;
-  const side = 2 * unit + 1;
-  const stamps = new Int32Array(2 * side * side).fill(-1);
-  const vertexAt = new Uint16Array(2 * side * side);
-  [[unit, 0, 0], [-unit, 0, 0], [0, unit, 0], [0, -unit, 0], [0, 0, unit], [0, 0, -unit]].forEach((p, i) => {
-    [px[i], py[i], pz[i]] = p;
-  });
-  let met = 0;
-  const add = (guess) => {
-    const vertex = met++;
-    const index = firstValue + vertex;
+  // Adds a vertex to the leaf, its numbers near those of two others.
+  add(a, b) {
+    const { numbers, channels, met } = this;
+    const index = this.firstValue + met;
     for (let k = 0; k < 3; k++) {
-      let step = channels[k][index];
-      if (step === 255) {
-        step = large[nextLarge++];
-      }
-      numbers[k][vertex] = guess(k) + unfold(step);
+      const step = channels[k][index];
+      numbers[k][met] = (numbers[k][a] + numbers[k][b] >> 1) + unfold(step < 255 ? step : this.large[this.nextLarge++]);
     }
-    const green = numbers[0][vertex];
-    values[index] = colors.word(green + numbers[1][vertex], green, green + numbers[2][vertex]);
-    return vertex;
-  };
-  const key = (a, b) => {
-    const [x, y, z] = [(px[a] + px[b]) >> 1, (py[a] + py[b]) >> 1, (pz[a] + pz[b]) >> 1];
-    return x + unit + side * (y + unit + (z < 0 ? side : 0));
-  };
-  const last = [0, 0, 0];
+    const green = numbers[0][met];
+    this.values[index] = this.colors.word(green + numbers[1][met], green, green + numbers[2][met]);
+    return this.met++;
+  }
 
-  for (let leaf = 0; leaf < faces.length; leaf++) {
-    met = 0;
-    for (let i = 0; i < 6; i++) {
-      add((k) => last[k]);
-      numbers.forEach((all, k) => { last[k] = all[i]; });
+  // Where the middle between two vertices is looked up.
+  place(a, b) {
+    const [xs, ys, zs] = this.positions;
+    const { unit, side } = this;
+    return (xs[a] + xs[b] >> 1) + unit + side * ((ys[a] + ys[b] >> 1) + unit + (zs[a] + zs[b] < 0 ? side : 0));
+  }
+
+  // Adds the corners of a face of the octahedron to a list of triangles.
+  static begin(list, face) {
+    list.six.set([face & 1, 2 + (face >> 1 & 1), 4 + (face >> 2)], 6 * list.count++);
+  }
+
+  // Adds the corners of a triangle's child.
+  static beget(list, six, at, child) {
+    const to = 6 * list.count++;
+    const corners = CHILDREN[child];
+    list.six[to] = six[at + corners[0]];
+    list.six[to + 1] = six[at + corners[1]];
+    list.six[to + 2] = six[at + corners[2]];
+  }
+
+  // The divided triangles, level by level, with all vertices.
+  divide() {
+    const { leaf, divided, stamps, vertexAt, positions } = this;
+    // The first numbers are near the last ones of the leaf before.
+    const before = this.met - 1;
+    this.met = 0;
+    for (let corner = 0; corner < 6; corner++) {
+      const near = corner > 0 ? corner - 1 : before;
+      this.add(near, near);
     }
-    // Divided triangles, six vertices each: corners and midpoints; which of their children are divided.
-    const triangles = [];
-    const masks = [];
+    divided.count = 0;
     for (let face = 0; face < 8; face++) {
-      if (faces[leaf] >> face & 1) {
-        triangles.push([face & 1, 2 + (face >> 1 & 1), 4 + (face >> 2)]);
+      if (this.faces[leaf] >> face & 1) {
+        Distributions.begin(divided, face);
       }
     }
-    for (let next = 0; next < triangles.length; next++) {
-      const six = triangles[next];
-      for (const [i, j] of ENDS) {
-        const [a, b] = [six[i], six[j]];
-        const place = key(a, b);
+    for (let next = 0; next < divided.count; next++) {
+      const { six } = divided;
+      const at = 6 * next;
+      for (let edge = 0; edge < 3; edge++) {
+        const [a, b] = [six[at + ENDS[edge][0]], six[at + ENDS[edge][1]]];
+        const place = this.place(a, b);
         if (stamps[place] !== leaf) {
           stamps[place] = leaf;
-          const vertex = vertexAt[place] = add((k) => (numbers[k][a] + numbers[k][b]) >> 1);
-          [px[vertex], py[vertex], pz[vertex]] = [(px[a] + px[b]) >> 1, (py[a] + py[b]) >> 1, (pz[a] + pz[b]) >> 1];
+          const vertex = vertexAt[place] = this.add(a, b);
+          for (let k = 0; k < 3; k++) {
+            positions[k][vertex] = positions[k][a] + positions[k][b] >> 1;
+          }
         }
-        six.push(vertexAt[place]);
+        six[at + 3 + edge] = vertexAt[place];
       }
-      const mask = children[nextChildren++];
-      masks.push(mask);
+      const mask = divided.mask[next] = this.children[this.nextChildren++];
       for (let child = 0; child < 4; child++) {
         if (mask >> child & 1) {
-          triangles.push(CHILDREN[child].map((i) => six[i]));
+          Distributions.beget(divided, six, at, child);
         }
       }
     }
-    numbers.forEach((all, k) => { last[k] = all[met - 1]; });
-    leaves.set([axes[leaf], nodes.length >> 1, firstValue], 4 * leaf);
-    leaves[4 * leaf + 3] = layOut(leaf, faces[leaf], triangles, masks) | flat[leaf] << 8;
-    firstValue += met;
   }
 
-  // Writes the nodes of a leaf; returns which faces have one. Undivided triangles have one if finer neighbours have put
-  // vertices on their edges.
-  function layOut(leaf, divided, triangles, masks) {
-    const firstNode = nodes.length >> 1;
-    const queue = [];
-    let below = 0;
-    const put = (corners, isDivided) => {
-      if (isDivided) {
-        queue.push({ six: triangles[below], mask: masks[below] });
-        below++;
-        return true;
-      }
-      const mids = ENDS.map(([i, j]) => {
-        const place = key(corners[i], corners[j]);
-        return stamps[place] === leaf ? vertexAt[place] : NO_VERTEX;
-      });
-      if (mids.every((mid) => mid === NO_VERTEX)) {
-        return false;
-      }
-      queue.push({ six: [...corners, ...mids], mask: -1 });
-      return true;
-    };
-    let roots = 0;
-    for (let face = 0; face < 8; face++) {
-      roots |= put([face & 1, 2 + (face >> 1 & 1), 4 + (face >> 2)], divided >> face & 1) << face;
+  // Fills in the midpoints of an undivided triangle, the last one of the list, that finer neighbours have put on its
+  // edges; takes it off again if there are none.
+  keep() {
+    const { kept, stamps, vertexAt, leaf } = this;
+    const at = 6 * (kept.count - 1);
+    let some = false;
+    for (let edge = 0; edge < 3; edge++) {
+      const place = this.place(kept.six[at + ENDS[edge][0]], kept.six[at + ENDS[edge][1]]);
+      const isThere = stamps[place] === leaf;
+      kept.six[at + 3 + edge] = isThere ? vertexAt[place] : NO_VERTEX;
+      some ||= isThere;
     }
-    for (let next = 0; next < queue.length; next++) {
-      const { six, mask } = queue[next];
-      const base = queue.length;
+    kept.mask[kept.count - 1] = -1;
+    kept.count -= some ? 0 : 1;
+    return some;
+  }
+
+  // Takes the next divided triangle as the last one of the list.
+  copy(next) {
+    const { kept, divided } = this;
+    kept.six.set(divided.six.subarray(6 * next, 6 * next + 6), 6 * (kept.count - 1));
+    kept.mask[kept.count - 1] = divided.mask[next];
+    return true;
+  }
+
+  // Writes the nodes of the leaf: its divided triangles, and undivided ones with midpoints.
+  layOut() {
+    const { leaf, kept } = this;
+    kept.count = 0;
+    let [roots, below] = [0, 0];
+    for (let face = 0; face < 8; face++) {
+      Distributions.begin(kept, face);
+      const isKept = this.faces[leaf] >> face & 1 ? this.copy(below++) : this.keep();
+      roots |= isKept << face;
+    }
+    this.leaves.set([this.axes[leaf], this.filled >> 1, this.firstValue, roots | this.flat[leaf] << 8], 4 * leaf);
+    for (let next = 0; next < kept.count; next++) {
+      const [at, mask, base] = [6 * next, kept.mask[next], kept.count];
       let have = 0;
       for (let child = 0; child < 4 && mask >= 0; child++) {
-        have |= put(CHILDREN[child].map((i) => six[i]), mask >> child & 1) << child;
+        Distributions.beget(kept, kept.six, at, child);
+        const isKept = mask >> child & 1 ? this.copy(below++) : this.keep();
+        have |= isKept << child;
       }
-      nodes.reserve(2);
-      nodes.array[nodes.length++] = six[3] | six[4] << 15 | six[5] << 30;
-      nodes.array[nodes.length++] = six[5] >> 2 | base << 13 | have << 28;
+      if (this.filled + 2 > this.nodes.length) {
+        const larger = new Uint32Array(2 * this.nodes.length);
+        larger.set(this.nodes);
+        this.nodes = larger;
+      }
+      const [a, b, c] = [kept.six[at + 3], kept.six[at + 4], kept.six[at + 5]];
+      this.nodes[this.filled++] = a | b << 15 | c << 30;
+      this.nodes[this.filled++] = c >> 2 | base << 13 | have << 28;
     }
-    return roots;
+    this.firstValue += this.met;
   }
-
-  return { leaves, nodes: nodes.all, values };
 }
 
 // Everything that is shown.
@@ -277,5 +296,5 @@ async function unpackScene(text) {
     new Blob([sections.bytes(`texture.${i}`)], { type: "image/png" }),
     { colorSpaceConversion: "none", premultiplyAlpha: "none" },
   )));
-  return { facts, diffuse, glossy, shares, pictures, distributions: unpackDistributions(sections, facts) };
+  return { facts, diffuse, glossy, shares, pictures, distributions: new Distributions(sections, facts) };
 }
