@@ -19,6 +19,8 @@ out vec3 radiance;
 const uint NO_VERTEX = 0x7fffu;
 // Cosine below which a distribution says less and less about what is reflected: it is no longer divided by it.
 const float LEAST_COSINE = 0.05;
+// Where normals point so far away from the eye (cosine) no triangle of the vertex is seen.
+const float HIDDEN = -0.5;
 
 ivec2 at(uint index) {
   return ivec2(index & WIDTH_MASK, index >> WIDTH_BITS);
@@ -90,6 +92,9 @@ void main() {
   radiance = vec3(0.0);
   vec3 away = normalize(eye - place);
   vec3 facing = unfolded(normal);
+  if (dot(facing, away) < HIDDEN) {
+    return;
+  }
   vec3 mirrored = reflect(away, facing);
   float weights = 0.0;
   for (uint i = 0u; i < range.y; i++) {

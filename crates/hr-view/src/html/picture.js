@@ -5,6 +5,8 @@
 const NEAR = 3e-4;
 // Triangles that are drawn or left out together.
 const CELL = 1024;
+// So many glossy vertices are evaluated in a frame without a graphics card, beside those that never were.
+const MOST_WHEN_SLOW = 12000;
 // Places of vertex attributes, the same in all programs.
 const PLACES = ["place", "irradiance", "tint", "emission", "uv", "glossy", "normal", "range"];
 
@@ -49,7 +51,10 @@ class Picture {
     this.scene = scene;
     const { lattice: { step } } = scene.facts;
     this.diagonal = 2 ** 20 * Math.hypot(...step);
-    const options = { antialias: !isSoftware(), alpha: false, powerPreference: "high-performance" };
+    // Walking smoothly comes before smooth edges, and before highlights that are up to date at every step.
+    const isSlow = isSoftware();
+    this.mostPerFrame = isSlow ? MOST_WHEN_SLOW : Infinity;
+    const options = { antialias: !isSlow, alpha: false, powerPreference: "high-performance" };
     const gl = this.gl = canvas.getContext("webgl2", options);
     if (!gl) {
       throw new Trouble("This browser has no WebGL 2; switch hardware acceleration on in its settings, or use another one");
@@ -199,7 +204,8 @@ class Picture {
     return texture;
   }
 
-  // Draws what a walker sees, `exposure` times as bright as automatically; returns how many vertices were evaluated.
+  // Draws what a walker sees, `exposure` times as bright as automatically; returns how many vertices were evaluated, and
+  // whether some are left for the next frame.
   draw(walker, exposure) {
     const { gl, canvas } = this;
     const [x, y] = walker.scales(canvas.width / canvas.height);
@@ -210,7 +216,7 @@ class Picture {
       return sides.every((side) => dot(side, to) > -radius) && dot(walker.forward, to) > -radius;
     };
     const [diffuse, glossy] = [this.diffuse, this.glossy].map((list) => list.cells.filter(isSeen));
-    const evaluated = this.evaluate(walker.eye, glossy);
+    const done = this.evaluate(walker.eye, glossy);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
@@ -228,7 +234,7 @@ class Picture {
     }
     this.drawCells(this.diffuse, diffuse);
     this.drawCells(this.glossy, glossy);
-    return evaluated;
+    return done;
   }
 
   drawCells(list, cells) {
@@ -258,15 +264,37 @@ class Picture {
     gl.bindVertexArray(null);
   }
 
-  // Brings the glossy radiances of all vertices of cells up to date with the eye.
-  evaluate(eye, cells) {
-    const { gl, glossy } = this;
-    const isStale = ({ seenFrom }) => !seenFrom || seenFrom.some((x, k) => x !== eye[k]);
+  // The cells whose vertices are to be evaluated now, and whether more are stale: first those that the eye has moved
+  // around most since.
+  choose(eye, cells) {
     const needed = new Set();
     cells.forEach((cell) => cell.needs.forEach((owner) => needed.add(owner)));
-    const stale = [...needed].sort((a, b) => a - b).map((i) => glossy.cells[i]).filter(isStale);
-    if (stale.length === 0) {
-      return 0;
+    const stale = [];
+    for (const index of needed) {
+      const cell = this.glossy.cells[index];
+      const moved = cell.seenFrom ? Math.hypot(...plus(eye, cell.seenFrom, -1)) : Infinity;
+      if (moved > 0) {
+        const distance = Math.hypot(...plus(eye, cell.center, -1)) - cell.radius;
+        stale.push({ index, turn: moved / Math.max(distance, 1e-3 * this.diagonal) });
+      }
+    }
+    stale.sort((a, b) => b.turn - a.turn);
+    let room = this.mostPerFrame;
+    const fits = ({ index, turn }) => {
+      const { firstVertex, endVertex } = this.glossy.cells[index];
+      room -= endVertex - firstVertex;
+      return room >= 0 || turn === Infinity;
+    };
+    const chosen = stale.filter(fits).map(({ index }) => index).sort((a, b) => a - b);
+    return { chosen: chosen.map((index) => this.glossy.cells[index]), isMore: chosen.length < stale.length };
+  }
+
+  // Brings the glossy radiances of vertices of cells up to date with the eye.
+  evaluate(eye, cells) {
+    const { gl } = this;
+    const { chosen, isMore } = this.choose(eye, cells);
+    if (chosen.length === 0) {
+      return { evaluated: 0, isMore };
     }
     const { program, places } = this.evaluator;
     gl.useProgram(program);
@@ -280,14 +308,14 @@ class Picture {
     gl.bindVertexArray(this.asked);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
     let evaluated = 0;
-    for (let i = 0; i < stale.length; i++) {
-      const first = stale[i].firstVertex;
-      let end = stale[i].endVertex;
-      stale[i].seenFrom = [...eye];
-      while (i + 1 < stale.length && stale[i + 1].firstVertex === end) {
+    for (let i = 0; i < chosen.length; i++) {
+      const first = chosen[i].firstVertex;
+      let end = chosen[i].endVertex;
+      chosen[i].seenFrom = [...eye];
+      while (i + 1 < chosen.length && chosen[i + 1].firstVertex === end) {
         i++;
-        end = stale[i].endVertex;
-        stale[i].seenFrom = [...eye];
+        end = chosen[i].endVertex;
+        chosen[i].seenFrom = [...eye];
       }
       if (end > first) {
         gl.bindBufferRange(gl.TRANSFORM_FEEDBACK_BUFFER, 0, this.radiance, 12 * first, 12 * (end - first));
@@ -301,11 +329,11 @@ class Picture {
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, null);
     gl.bindVertexArray(null);
     gl.disable(gl.RASTERIZER_DISCARD);
-    return evaluated;
+    return { evaluated, isMore };
   }
 }
 
-// Whether pictures are drawn without a graphics card: walking smoothly comes before smooth edges then.
+// Whether pictures are drawn without a graphics card.
 function isSoftware() {
   const gl = document.createElement("canvas").getContext("webgl2");
   const names = gl?.getExtension("WEBGL_debug_renderer_info");

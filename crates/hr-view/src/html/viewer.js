@@ -235,10 +235,11 @@ class Viewer {
       frame.time = now - frame.last;
       walker.advance(frame.time / 1000);
     }
-    frame.evaluated = this.picture.draw(walker, 2 ** this.stops);
+    const { evaluated, isMore } = this.picture.draw(walker, 2 ** this.stops);
+    frame.evaluated = evaluated;
     this.tell();
     frame.last = walker.isMoving ? now : null;
-    if (walker.isMoving) {
+    if (walker.isMoving || isMore) {
       this.redraw();
     }
   }
