@@ -4,11 +4,16 @@
 //! evaluated at the vertices from the directional distributions of the leaves around them, in a vertex shader, whenever
 //! the eye has moved. Exposure, filmic curve and sRGB encoding happen per pixel with the window's own constants.
 //!
-//! # What is given up for the size
+//! # What is given up for the size and for speed
 //! - Round surfaces have fewer triangles ([`ROUNDNESS`]).
 //! - Distributions are coarsened until few enough values are left, and quantised (module `directions`).
 //! - Positions are rounded to a millionth of the scene's size, colours to 9 bits, normals to 0.004°, the weights of
 //!   the distributions around a vertex to 1/255.
+//! - Without a graphics card edges are not smoothed, and while the eye moves only those glossy vertices are evaluated
+//!   whose direction has changed most; the others follow as soon as it rests.
+//!
+//! Pictures of the page and of the ray caster differ by 0.2 to 0.4 % on average outside silhouettes; the browser test
+//! keeps that below 1.5 %.
 //!
 //! # Layout
 //! After the viewer comes one script element with base64 text of a gzip file (whose checksum tells a damaged page from a

@@ -1,7 +1,7 @@
 //! Directional distributions in few bytes.
 //!
 //! Distributions are coarsened to what can be seen of them ([`Haar::average`]), then taken apart
-//! ([`Haar::outline`](Haar::outline)). Values become whole numbers on a logarithmic scale, and of those only the
+//! ([`Haar::outline`]). Values become whole numbers on a logarithmic scale, and of those only the
 //! difference to the mean of the edge's ends is kept: most are small, and most colours are those of the edge's ends.
 
 use super::payload::{Payload, fold};
@@ -9,18 +9,19 @@ use glossy_ext::haar::{Haar, Outline, Refinement, Refiner};
 use hr_diffuse::Rgb;
 use rayon::prelude::*;
 
-/// Radiances below this count as that bright where errors are judged; middle grey is 0.18. Half of it, and so much
-/// more, cannot be told apart beside the light that every surface sends diffusely.
+/// Added to radiances, at automatic exposure, where errors are judged relative to them: 1.8 stops below middle grey, so
+/// that nothing is spent on what is nearly black.
 pub(super) const FLOOR: f32 = 0.05;
-/// From one whole number to the next, radiance plus [`FLOOR`] grows by this factor: less than one code of an 8-bit
-/// sRGB picture.
+/// From one whole number to the next, radiance plus [`FLOOR`] grows by this factor. Rounding, 1 % at most, is half a code
+/// of an 8-bit sRGB picture in its middle tones.
 pub(super) const GROWTH: f32 = 1.02;
 /// The largest whole number: 2e7 times the floor.
 pub(super) const MOST: i32 = 850;
 /// How far coarser distributions may be off relative to the radiance that is seen: the first that leaves few enough
-/// values.
+/// values. In a soda shop of 3,931 distributions 0.1 and 0.2 change pictures by 0.4 and 1 code of 255 on average, and keep
+/// 70 % and 50 % of the values.
 const TOLERANCES: [f32; 4] = [0.1, 0.2, 0.4, 0.8];
-/// Vertices of all distributions of a page. One takes about 1.2 bytes.
+/// Vertices of all distributions of a page. Each takes about 2.3 bytes in the end: 5 MB.
 const MOST_VALUES: usize = 2_200_000;
 /// Distributions of a page are no finer than this: what [`Refinement::default`] makes.
 pub(super) const MAX_LEVEL: u8 = 6;
@@ -33,14 +34,12 @@ pub(super) struct Shine<'a> {
     pub(super) beside: Rgb,
 }
 
-/// Adds the distributions, times `exposure`. Returns the tolerance that they were coarsened to.
-pub(super) fn add(payload: &mut Payload, shines: &[Shine<'_>], exposure: f32) -> f32 {
-    let mut outlines = Vec::new();
-    let mut tolerance = 0.0;
-    for wanted in TOLERANCES {
-        tolerance = wanted;
+/// Adds the distributions, times `exposure`.
+pub(super) fn add(payload: &mut Payload, shines: &[Shine<'_>], exposure: f32) {
+    let mut outlines: Vec<Outline> = Vec::new();
+    for tolerance in TOLERANCES {
         outlines = shines.par_iter().map(|shine| coarse(shine, tolerance, exposure)).collect();
-        if outlines.iter().map(|outline: &Outline| outline.values.len()).sum::<usize>() <= MOST_VALUES {
+        if outlines.iter().map(|outline| outline.values.len()).sum::<usize>() <= MOST_VALUES {
             break;
         }
     }
@@ -78,9 +77,9 @@ pub(super) fn add(payload: &mut Payload, shines: &[Shine<'_>], exposure: f32) ->
         payload.bytes(name, stream);
     }
     payload.words("large", &large);
-    tolerance
 }
 
+/// What is kept of a distribution.
 fn coarse(shine: &Shine<'_>, tolerance: f32, exposure: f32) -> Outline {
     let settings = Refinement {
         min_level: 0,
@@ -106,4 +105,39 @@ fn channels(value: Rgb) -> [i32; 3] {
 /// Rounded down, as a shift does.
 fn mean([a, b]: [[i32; 3]; 2]) -> [i32; 3] {
     [0, 1, 2].map(|channel| (a[channel] + b[channel]) >> 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+    use glossy_ext::haar::{Known, Peak};
+
+    #[test]
+    fn too_many_values_are_coarsened_and_black_has_corners() {
+        let axis = Vec3::new(0.3, 0.5, 0.8).normalize();
+        let lobe = |d: Vec3| Rgb::new(2.0, 1.0, 0.5) * d.dot(axis).max(0.0).powi(80) + 0.1 * (1.0 + d.z);
+        let peaks = [Peak { direction: axis, width: 0.1 }];
+        let haar = Haar::project(&Refinement::default(), &Known { peaks: &peaks, ..Known::NOTHING }, lobe).haar;
+        let shine = |haar| Shine { haar, beside: Rgb::ZERO };
+        let counts = TOLERANCES.map(|tolerance| coarse(&shine(&haar), tolerance, 1.0).values.len());
+        assert!(counts.is_sorted_by(|a, b| a > b), "coarser and coarser: {counts:?}");
+        let black = Haar::default();
+        assert_eq!(coarse(&shine(&black), 0.1, 1.0).values, [Rgb::ZERO; 6], "black has six corners");
+    }
+
+    #[test]
+    fn numbers_keep_colors_to_a_percent() {
+        let back = |number: i32| FLOOR * ((number as f32 * GROWTH.ln()).exp() - 1.0);
+        for i in 0..300 {
+            let value = Rgb::new(1.0, 0.8, 0.1) * 1e-3 * 1.05_f32.powi(i);
+            let [green, red, blue] = channels(value);
+            for (found, wanted) in [green + red, green, green + blue].into_iter().zip(value.to_array()) {
+                // Half a step of the scale.
+                let off = (back(found) - wanted).abs();
+                assert!(off <= 0.0101 * (wanted + FLOOR), "{wanted} comes back off by {off}");
+            }
+        }
+        assert_eq!(channels(Rgb::new(f32::INFINITY, -1.0, f32::NAN)), [0, MOST, 0], "nonsense has its place");
+    }
 }

@@ -58,3 +58,40 @@ impl Payload {
 pub(super) fn fold(step: i32) -> u32 {
     (step.cast_unsigned() << 1) ^ (step >> 31).cast_unsigned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sections_are_where_the_header_says() {
+        let mut payload = Payload::default();
+        payload.bytes("a", b"xyz");
+        payload.words("b", &[0x0403_0201, 0x0807_0605]);
+        payload.steps("c", [5, 4, u32::MAX, 7]);
+        let mut out = Vec::new();
+        payload.write(&serde_json::json!({ "fact": 1 }), &mut out).expect("memory takes it");
+        let length = u32::from_le_bytes(out[..4].try_into().expect("four bytes")) as usize;
+        let header: serde_json::Value = serde_json::from_slice(&out[4..4 + length]).expect("JSON");
+        assert_eq!(header["fact"], 1, "facts are kept: {header}");
+        let section = |name: &str| {
+            let [start, size] = [0, 1].map(|i| header["sections"][name][i].as_u64().expect("a number") as usize);
+            &out[4 + length + start..][..size]
+        };
+        assert_eq!(section("a"), b"xyz", "bytes are as they are");
+        assert_eq!(section("b"), [1, 5, 2, 6, 3, 7, 4, 8], "words are by place");
+        // +5, −1, −5 around the end of the numbers, +8.
+        assert_eq!(section("c")[..4], [10, 1, 9, 16], "steps are folded");
+        assert!(section("c")[4..].iter().all(|&byte| byte == 0), "and small");
+    }
+
+    #[test]
+    fn folding_loses_nothing() {
+        for step in [0, 1, -1, 2, -2, 1000, -1000, i32::MAX, i32::MIN] {
+            let folded = fold(step);
+            let unfolded = (folded >> 1).cast_signed() ^ -(folded & 1).cast_signed();
+            assert_eq!(unfolded, step, "{step} became {folded}");
+            assert!(step.unsigned_abs() > 1000 || folded <= 2000, "{step} became {folded}: small stays small");
+        }
+    }
+}

@@ -6,7 +6,7 @@ const NEAR = 3e-4;
 // Triangles that are drawn or left out together.
 const CELL = 1024;
 // So many glossy vertices are evaluated in a frame without a graphics card, beside those that never were.
-const MOST_WHEN_SLOW = 12000;
+const MOST_WHEN_SLOW = 8000;
 // Places of vertex attributes, the same in all programs.
 const PLACES = ["place", "irradiance", "tint", "emission", "uv", "glossy", "normal", "range"];
 
