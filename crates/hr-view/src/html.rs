@@ -78,7 +78,8 @@ struct Facts<'a> {
 /// # Errors
 /// [`ViewError::Scene`] with `path` where it cannot be written.
 pub fn write(solved: &Solved, path: &Path) -> Result<(), ViewError> {
-    let (mesh, sources) = facets(&solved.scene, &solved.solution, ROUNDNESS);
+    let (mut mesh, sources) = facets(&solved.scene, &solved.solution, ROUNDNESS);
+    vertices::gather(&mut mesh);
     Ok(write_whole(path, |out| page(solved, &mesh, &sources, out))?)
 }
 

@@ -178,6 +178,7 @@ fn the_page_shows_what_the_window_shows() {
     assert_eq!(said["faults"], serde_json::json!([]), "nothing is complained of");
     assert_eq!(said["idle"], 0, "nothing is drawn while nothing changes");
     assert!(said["help"].as_u64() > Some(10), "help shows the keys: {said}");
+    assert_eq!(said["restored"], true, "a lost device comes back");
     for (name, moved) in said["moves"].as_object().expect("moves") {
         assert_eq!(moved, true, "{name} changes the picture");
     }

@@ -125,7 +125,7 @@ class Distributions {
     this.nodes = new Uint32Array(4 * this.children.length + 64);
     [this.filled, this.firstValue, this.nextChildren, this.nextLarge] = [0, 0, 0, 0];
     this.met = 1;
-    // Of the vertices of the leaf at hand: numbers (green, red and blue less green), and positions on the octahedron in
+    // Of the vertices of the leaf at hand: numbers (green; half of red and blue less green), and positions on the octahedron in
     // steps of the finest level.
     this.numbers = [0, 1, 2].map(() => new Int32Array(NO_VERTEX));
     this.positions = [0, 1, 2].map(() => new Int16Array(NO_VERTEX));
@@ -155,7 +155,7 @@ class Distributions {
       numbers[k][met] = (numbers[k][a] + numbers[k][b] >> 1) + unfold(step < 255 ? step : this.large[this.nextLarge++]);
     }
     const green = numbers[0][met];
-    this.values[index] = this.colors.word(green + numbers[1][met], green, green + numbers[2][met]);
+    this.values[index] = this.colors.word(green + 2 * numbers[1][met], green, green + 2 * numbers[2][met]);
     return this.met++;
   }
 

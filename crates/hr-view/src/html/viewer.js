@@ -99,10 +99,14 @@ class Viewer {
     element("help-button").addEventListener("click", () => { this.toggle("help"); canvas.focus(); });
     element("stops").addEventListener("input", (event) => { this.expose(Number(event.target.value)); });
     element("breadth").addEventListener("input", (event) => { this.widen(Number(event.target.value)); });
+    for (const id of ["stops", "breadth"]) {
+      // Arrow keys are for walking again.
+      element(id).addEventListener("change", () => canvas.focus());
+    }
   }
 
   key(event) {
-    if (event.ctrlKey || event.altKey || event.metaKey || event.target instanceof HTMLSelectElement) {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches?.("select, input")) {
       return;
     }
     const digit = /^Digit(\d)$/.exec(event.code);

@@ -160,9 +160,18 @@ await key("keyUp", "KeyW");
 await key("keyUp", "ArrowLeft");
 const wrong = faults;
 
+// A device that is taken away and given back.
+const begun = await picture();
+await ask("self.taken = document.getElementById('picture').getContext('webgl2').getExtension('WEBGL_lose_context'), taken.loseContext()");
+await rest(200);
+const lost = await ask("document.documentElement.dataset.state");
+await ask("taken.restoreContext()");
+await rest(200);
+const restored = lost === "waiting" && (await picture()).data === begun.data;
+
 const damage = [];
 for (const path of broken) {
   damage.push(await open(path));
 }
-console.log(JSON.stringify({ ...said, faults: wrong, still: still.name, second: second.name, idle, moves, help, rate, damage }));
+console.log(JSON.stringify({ ...said, faults: wrong, still: still.name, second: second.name, idle, moves, help, rate, restored, damage }));
 process.exit(0);
