@@ -5,7 +5,7 @@
 //! the eye has moved. Exposure, filmic curve and sRGB encoding happen per pixel with the window's own constants.
 //!
 //! # What is given up for the size and for speed
-//! - Round surfaces have fewer triangles ([`ROUNDNESS`]).
+//! - Round surfaces have fewer triangles: chords of 14°, or of 45° within 3 mm in a room of 10 m.
 //! - Distributions are coarsened until few enough values are left, and quantised (module `directions`).
 //! - Positions are rounded to a millionth of the scene's size, colours to 9 bits, normals to 0.004°, the weights of
 //!   the distributions around a vertex to 1/255.
@@ -22,6 +22,7 @@
 mod colors;
 mod directions;
 mod images;
+mod leaves;
 mod payload;
 mod vertices;
 
@@ -29,30 +30,23 @@ use crate::ViewError;
 use crate::display::{DisplayMesh, up_of};
 use crate::facets::{Roundness, Source, facets};
 use crate::solved::Solved;
-use crate::window::lists::{VertexList, split};
+use crate::window::lists::split;
 use crate::window::tone::BRIGHTEST;
 use crate::window::{Curve, Tone};
 use base64::engine::general_purpose::STANDARD;
 use base64::write::EncoderWriter;
-use directions::Shine;
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use glossy_ext::haar::{Haar, Known, Refinement};
-use hr_diffuse::Rgb;
 use hr_scene::Camera;
 use hr_scene::whole_file::write_whole;
 use payload::Payload;
 use serde::Serialize;
-use std::collections::HashMap;
-use std::f32::consts::FRAC_1_PI;
 use std::io::{self, Write};
 use std::path::Path;
 use vertices::Lattice;
 
 /// How round surfaces are: 14°, or 45° within 3 mm in a room of 10 m.
 const ROUNDNESS: Roundness = Roundness { fine: 0.25, flat_enough: 3e-4, coarse: 0.8 };
-/// At most so many distributions are evaluated for a vertex; the weakest are left out.
-const MOST_SHARES: usize = 12;
 
 /// What the page's script reads first.
 #[derive(Serialize)]
@@ -117,7 +111,7 @@ fn solution(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut i
     let mut payload = Payload::default();
     let names = ["diffuse", "glossy"];
     let lists_facts = [0, 1].map(|i| vertices::add(&mut payload, names[i], mesh, &lists[i], &lattice, tone.exposure));
-    shine(&mut payload, solved, mesh, sources, &lists[1], tone.exposure);
+    leaves::add(&mut payload, solved, mesh, sources, &lists[1], tone.exposure);
     let textures = mesh.textures.iter().enumerate().map(|(i, texture)| images::add(&mut payload, i, texture));
     let facts = Facts {
         name: &solved.scene.name,
@@ -136,85 +130,4 @@ fn solution(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut i
         max_level: directions::MAX_LEVEL,
     };
     payload.write(&facts, out)
-}
-
-/// The distributions around the vertices of the glossy list, with their weights.
-fn shine(
-    payload: &mut Payload,
-    solved: &Solved,
-    mesh: &DisplayMesh,
-    sources: &[Source],
-    list: &VertexList,
-    exposure: f32,
-) {
-    let source_of: HashMap<u32, &Source> = std::iter::zip(mesh.glossy.iter().copied(), sources).collect();
-    let mut index: HashMap<u32, u32> = HashMap::new();
-    let mut leaves = Vec::new();
-    let (mut counts, mut members, mut weights) = (Vec::new(), Vec::new(), Vec::new());
-    for vertex in &list.vertices {
-        let shares = source_of.get(vertex).map_or_else(Vec::new, |source| shares(solved, source));
-        counts.push(shares.len() as u8);
-        for (leaf, weight) in shares {
-            members.push(*index.entry(leaf).or_insert_with(|| {
-                leaves.push(leaf);
-                leaves.len() as u32 - 1
-            }));
-            weights.push(weight);
-        }
-    }
-    let normals = list.vertices.iter().map(|&vertex| vertices::packed_normal(mesh.normals[vertex as usize]));
-    payload.words("glossy.normals", &normals.collect::<Vec<_>>());
-    payload.bytes("glossy.counts", &counts);
-    payload.steps("glossy.leaves", members);
-    payload.bytes("glossy.weights", &weights);
-    let solution = &solved.solution;
-    let elements = leaves.iter().map(|&leaf| &solution.elements.nodes[leaf as usize]);
-    let axes: Vec<u32> = elements.clone().map(|element| vertices::packed_normal(element.normals.axis)).collect();
-    payload.words("leaf.axes", &axes);
-    // Those that are carried as diffuse light are the same in all directions.
-    let even: Vec<Option<Haar>> = leaves
-        .iter()
-        .map(|&leaf| {
-            let here = leaf as usize;
-            solution.reflected[here].is_empty().then(|| {
-                let albedo = hr_diffuse::LightField::active(&solution.field, solution.elements.nodes[here].material);
-                let light = solution.exitant.irradiance[here] * albedo.unwrap_or(Rgb::ZERO) * FRAC_1_PI;
-                Haar::project(&Refinement { min_level: 0, ..Refinement::default() }, &Known::NOTHING, |_| light).haar
-            })
-        })
-        .collect();
-    let flat: Vec<u8> =
-        std::iter::zip(elements, &even).map(|(element, even)| u8::from(element.is_flat() || even.is_some())).collect();
-    payload.bytes("leaf.flat", &flat);
-    let shines: Vec<Shine<'_>> = std::iter::zip(&leaves, &even)
-        .map(|(&leaf, even)| {
-            let material = solution.elements.nodes[leaf as usize].material;
-            let diffuse = solved.scene.materials[material as usize].reflector.diffuse();
-            let beside = diffuse * solution.exitant.irradiance[leaf as usize] * FRAC_1_PI;
-            Shine { haar: even.as_ref().unwrap_or(&solution.reflected[leaf as usize]), beside }
-        })
-        .collect();
-    directions::add(payload, &shines, exposure);
-}
-
-/// The leaves around a vertex and their weights, as [`glossy::interpolated`](crate::glossy::interpolated) has them,
-/// relative to the largest.
-fn shares(solved: &Solved, source: &Source) -> Vec<(u32, u8)> {
-    let solution = &solved.solution;
-    let mut shares: Vec<(u32, f32)> = Vec::new();
-    for &(vertex, share) in source.corners.iter().filter(|(_, share)| *share > 0.0) {
-        let around = solution.vertices.leaves_around(vertex);
-        for &leaf in around {
-            let weight = solution.elements.exposed(leaf) * share / around.len() as f32;
-            match shares.iter_mut().find(|(known, _)| *known == leaf) {
-                Some((_, sum)) => *sum += weight,
-                None => shares.push((leaf, weight)),
-            }
-        }
-    }
-    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
-    shares.truncate(MOST_SHARES);
-    let largest = shares.first().map_or(0.0, |share| share.1);
-    let scaled = shares.into_iter().map(|(leaf, weight)| (leaf, (weight / largest * 255.0).round() as u8));
-    scaled.filter(|(_, weight)| *weight > 0).collect()
 }
