@@ -128,11 +128,9 @@ class Distributions {
     // Of the vertices of the leaf at hand: numbers (green; half of red and blue less green), and positions on the octahedron in
     // steps of the finest level.
     this.numbers = [0, 1, 2].map(() => new Int32Array(NO_VERTEX));
-    this.positions = [0, 1, 2].map(() => new Int16Array(NO_VERTEX));
+    [this.xs, this.ys, this.zs] = [0, 1, 2].map(() => new Int16Array(NO_VERTEX));
     const unit = this.unit = 1 << facts.max_level;
-    [[unit, 0, 0], [-unit, 0, 0], [0, unit, 0], [0, -unit, 0], [0, 0, unit], [0, 0, -unit]].forEach((position, vertex) => {
-      position.forEach((x, k) => { this.positions[k][vertex] = x; });
-    });
+    [this.xs, this.ys, this.zs].forEach((positions, k) => { positions.set([unit, -unit], 2 * k); });
     // Its vertices by position; an entry counts if its stamp is the leaf's number.
     this.side = 2 * unit + 1;
     this.stamps = new Int32Array(2 * this.side ** 2).fill(-1);
@@ -161,8 +159,7 @@ class Distributions {
 
   // Where the middle between two vertices is looked up.
   place(a, b) {
-    const [xs, ys, zs] = this.positions;
-    const { unit, side } = this;
+    const { xs, ys, zs, unit, side } = this;
     return (xs[a] + xs[b] >> 1) + unit + side * ((ys[a] + ys[b] >> 1) + unit + (zs[a] + zs[b] < 0 ? side : 0));
   }
 
@@ -182,7 +179,7 @@ class Distributions {
 
   // The divided triangles, level by level, with all vertices.
   divide() {
-    const { leaf, divided, stamps, vertexAt, positions } = this;
+    const { leaf, divided, stamps, vertexAt, xs, ys, zs } = this;
     // The first numbers are near the last ones of the leaf before.
     const before = this.met - 1;
     this.met = 0;
@@ -200,14 +197,15 @@ class Distributions {
       const { six } = divided;
       const at = 6 * next;
       for (let edge = 0; edge < 3; edge++) {
-        const [a, b] = [six[at + ENDS[edge][0]], six[at + ENDS[edge][1]]];
+        const a = six[at + ENDS[edge][0]];
+        const b = six[at + ENDS[edge][1]];
         const place = this.place(a, b);
         if (stamps[place] !== leaf) {
           stamps[place] = leaf;
           const vertex = vertexAt[place] = this.add(a, b);
-          for (let k = 0; k < 3; k++) {
-            positions[k][vertex] = positions[k][a] + positions[k][b] >> 1;
-          }
+          xs[vertex] = xs[a] + xs[b] >> 1;
+          ys[vertex] = ys[a] + ys[b] >> 1;
+          zs[vertex] = zs[a] + zs[b] >> 1;
         }
         six[at + 3 + edge] = vertexAt[place];
       }
@@ -240,7 +238,9 @@ class Distributions {
   // Takes the next divided triangle as the last one of the list.
   copy(next) {
     const { kept, divided } = this;
-    kept.six.set(divided.six.subarray(6 * next, 6 * next + 6), 6 * (kept.count - 1));
+    for (let i = 0, to = 6 * (kept.count - 1); i < 6; i++) {
+      kept.six[to + i] = divided.six[6 * next + i];
+    }
     kept.mask[kept.count - 1] = divided.mask[next];
     return true;
   }
@@ -257,7 +257,9 @@ class Distributions {
     }
     this.leaves.set([this.axes[leaf], this.filled >> 1, this.firstValue, roots | this.flat[leaf] << 8], 4 * leaf);
     for (let next = 0; next < kept.count; next++) {
-      const [at, mask, base] = [6 * next, kept.mask[next], kept.count];
+      const at = 6 * next;
+      const mask = kept.mask[next];
+      const base = kept.count;
       let have = 0;
       for (let child = 0; child < 4 && mask >= 0; child++) {
         Distributions.beget(kept, kept.six, at, child);
@@ -269,9 +271,9 @@ class Distributions {
         larger.set(this.nodes);
         this.nodes = larger;
       }
-      const [a, b, c] = [kept.six[at + 3], kept.six[at + 4], kept.six[at + 5]];
-      this.nodes[this.filled++] = a | b << 15 | c << 30;
-      this.nodes[this.filled++] = c >> 2 | base << 13 | have << 28;
+      const last = kept.six[at + 5];
+      this.nodes[this.filled++] = kept.six[at + 3] | kept.six[at + 4] << 15 | last << 30;
+      this.nodes[this.filled++] = last >> 2 | base << 13 | have << 28;
     }
     this.firstValue += this.met;
   }
