@@ -9,9 +9,9 @@ const BIAS: i32 = 15;
 /// The largest number that there is: all bits of a channel with the largest exponent.
 const LARGEST: f32 = 65408.0;
 
-/// Three channels of 9 bits, red lowest, over a common exponent of 5 bits: the shared-exponent format of OpenGL ES 3.0.6,
-/// section 3.8.3.2. Accurate to 1/1022 of the largest channel between 2⁻¹⁵ and 65408; what is negative or not a number
-/// becomes 0, what is larger than the largest that.
+/// Three channels of 9 bits, red lowest, over a common exponent of 5 bits: the shared-exponent format of OpenGL ES
+/// 3.0.6, section 3.8.3.2. Accurate to 1/512 of the largest channel between 2⁻¹⁵ and 65408; what is negative or not a
+/// number becomes 0, what is larger than the largest that.
 pub(super) fn shared_exponent(color: Rgb) -> u32 {
     let channels = color.to_array().map(|c| if c > 0.0 { c.min(LARGEST) } else { 0.0 });
     let largest = channels.into_iter().fold(0.0, f32::max);

@@ -12,14 +12,14 @@ use rayon::prelude::*;
 /// Added to radiances, at automatic exposure, where errors are judged relative to them: 1.8 stops below middle grey, so
 /// that nothing is spent on what is nearly black.
 pub(super) const FLOOR: f32 = 0.05;
-/// From one whole number to the next, radiance plus [`FLOOR`] grows by this factor. Rounding, 1 % at most, is half a code
-/// of an 8-bit sRGB picture in its middle tones.
+/// From one whole number to the next, radiance plus [`FLOOR`] grows by this factor. Rounding, 1 % at most, is half a
+/// code of an 8-bit sRGB picture in its middle tones.
 pub(super) const GROWTH: f32 = 1.02;
 /// The largest whole number: 2e7 times the floor.
 pub(super) const MOST: i32 = 850;
-/// How far coarser distributions may be off relative to the radiance that is seen, and their finest level: the first that
-/// leaves few enough values. In a soda shop of 3,931 distributions 0.1 and 0.2 change pictures by 0.4 and 1 code of 255 on
-/// average, and keep 70 % and 50 % of the values. Triangles of level 5 are 3° wide.
+/// How far coarser distributions may be off relative to the radiance that is seen, and their finest level: the first
+/// that leaves few enough values. In a soda shop of 3,931 distributions 0.1 and 0.2 change pictures by 0.4 and 1 code of
+/// 255 on average, and keep 70 % and 50 % of the values. Triangles of level 5 are 3° wide.
 const TOLERANCES: [(f32, u8); 5] = [(0.1, MAX_LEVEL), (0.2, MAX_LEVEL), (0.2, 5), (0.4, 5), (0.4, 4)];
 /// Vertices of all distributions of a page. Each takes about 2 bytes in the end: 4.4 MB.
 const MOST_VALUES: usize = 2_200_000;

@@ -8,7 +8,7 @@ precision highp sampler2D;
 uniform vec3 eye;           // relative to the mesh's origin
 uniform usampler2D shares;  // a leaf in the low 24 bits, its weight above
 uniform usampler2D leaves;  // axis; first node; first value; bits 0 … 7: faces that have a node, bit 8: flat
-uniform usampler2D nodes;   // three midpoints of 15 bits, the first child's node of 15, four bits: children that have one
+uniform usampler2D nodes;   // three midpoints of 15 bits, first child's node of 15, four bits: children that have one
 uniform sampler2D values;   // at the vertices of distributions
 
 in vec3 place;
@@ -78,7 +78,9 @@ vec3 evaluate(uvec4 leaf, vec3 direction) {
       vec3 d = mids.x == NO_VERTEX ? 0.5 * (b + c) : value(leaf.z, mids.x);
       vec3 e = mids.y == NO_VERTEX ? 0.5 * (c + a) : value(leaf.z, mids.y);
       vec3 f = mids.z == NO_VERTEX ? 0.5 * (a + b) : value(leaf.z, mids.z);
-      mat3 part = which == 0u ? mat3(a, f, e) : which == 1u ? mat3(f, b, d) : which == 2u ? mat3(e, d, c) : mat3(d, e, f);
+      mat3 part = which == 0u ? mat3(a, f, e)
+        : which == 1u ? mat3(f, b, d)
+        : which == 2u ? mat3(e, d, c) : mat3(d, e, f);
       return part * p / (p.x + p.y + p.z);
     }
     corners = inner;

@@ -57,7 +57,7 @@ class Picture {
     const options = { antialias: !isSlow, alpha: false, powerPreference: "high-performance" };
     const gl = this.gl = canvas.getContext("webgl2", options);
     if (!gl) {
-      throw new Trouble("This browser has no WebGL 2; switch hardware acceleration on in its settings, or use another one");
+      throw new Trouble("This browser has no WebGL 2; switch hardware acceleration on, or use another browser");
     }
     this.diffuse = { ...scene.diffuse, cells: makeCells(scene.diffuse, this.diagonal) };
     this.glossy = { ...scene.glossy, cells: makeCells(scene.glossy, this.diagonal) };
@@ -68,15 +68,19 @@ class Picture {
   prepare() {
     const { gl, scene, diffuse, glossy } = this;
     this.width = Math.min(gl.getParameter(gl.MAX_TEXTURE_SIZE), 4096);
-    this.programs = [false, true].map((textured) => this.program("scene-vertex", "scene-fragment", textured ? "#define TEXTURED" : ""));
+    // Without and with texture.
+    this.programs = ["", "#define TEXTURED"].map((defines) => this.program("scene-vertex", "scene-fragment", defines));
     const bits = Math.log2(this.width);
-    const defines = `#define WIDTH_BITS ${bits}u\n#define WIDTH_MASK ${this.width - 1}u\n#define MAX_LEVEL ${scene.facts.max_level}`;
-    this.evaluator = this.program("glossy-vertex", null, defines);
+    const constants = { WIDTH_BITS: `${bits}u`, WIDTH_MASK: `${this.width - 1}u`, MAX_LEVEL: scene.facts.max_level };
+    const defines = Object.entries(constants).map(([name, value]) => `#define ${name} ${value}`);
+    this.evaluator = this.program("glossy-vertex", null, defines.join("\n"));
+    const { distributions } = scene;
+    const nodes = distributions.nodes.subarray(0, distributions.filled);
     this.tables = {
       shares: this.table(scene.shares, gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT, 1),
-      leaves: this.table(scene.distributions.leaves, gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 4),
-      nodes: this.table(scene.distributions.nodes.subarray(0, scene.distributions.filled), gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT, 2),
-      values: this.table(scene.distributions.values, gl.RGB9_E5, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV, 1),
+      leaves: this.table(distributions.leaves, gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 4),
+      nodes: this.table(nodes, gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT, 2),
+      values: this.table(distributions.values, gl.RGB9_E5, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV, 1),
     };
     this.textures = scene.pictures.map((picture, i) => this.texture(picture, scene.facts.textures[i]));
     this.radiance = gl.createBuffer();
@@ -154,8 +158,9 @@ class Picture {
     }
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
-      const log = [gl.getProgramInfoLog(program), ...shaders.map((s) => gl.getShaderInfoLog(s))].filter(Boolean).join("; ");
-      throw new Trouble(`The graphics driver does not take the shader ${vertex} (${log}); update it, or use another browser`);
+      const logs = [gl.getProgramInfoLog(program), ...shaders.map((s) => gl.getShaderInfoLog(s))];
+      const log = logs.filter(Boolean).join("; ");
+      throw new Trouble(`The graphics driver does not take the shader ${vertex} (${log}); update it or the browser`);
     }
     const places = {};
     for (let i = 0; i < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); i++) {
@@ -204,8 +209,8 @@ class Picture {
     return texture;
   }
 
-  // Draws what a walker sees, `exposure` times as bright as automatically; returns how many vertices were evaluated, and
-  // whether some are left for the next frame.
+  // Draws what a walker sees, `exposure` times as bright as automatically; returns how many vertices were evaluated,
+  // and whether some are left for the next frame.
   draw(walker, exposure) {
     const { gl, canvas } = this;
     const [x, y] = walker.scales(canvas.width / canvas.height);

@@ -6,7 +6,7 @@ class Trouble extends Error {}
 
 async function unpack(text) {
   if (!self.DecompressionStream) {
-    throw new Trouble("This browser is too old, it cannot unpack the scene; use Chrome 80, Firefox 113, Safari 16.4 or later");
+    throw new Trouble("This browser is too old to unpack the scene; use Chrome 80, Firefox 113, Safari 16.4 or later");
   }
   let bytes;
   try {
@@ -76,7 +76,8 @@ function unpackList(sections, name, { batches }, { low, step }) {
   const [u, v] = ["u", "v"].map((axis) => sections.floats(`${name}.${axis}`));
   const uv = new Float32Array(2 * u.length);
   u.forEach((_, i) => { uv[2 * i] = u[i]; uv[2 * i + 1] = v[i]; });
-  const [irradiance, tint, emission] = ["irradiance", "tint", "emission"].map((what) => sections.words(`${name}.${what}`));
+  const colors = ["irradiance", "tint", "emission"];
+  const [irradiance, tint, emission] = colors.map((what) => sections.words(`${name}.${what}`));
   return { batches, places, uv, irradiance, tint, emission, indices: sections.steps(`${name}.indices`) };
 }
 
@@ -125,8 +126,8 @@ class Distributions {
     this.nodes = new Uint32Array(4 * this.children.length + 64);
     [this.filled, this.firstValue, this.nextChildren, this.nextLarge] = [0, 0, 0, 0];
     this.met = 1;
-    // Of the vertices of the leaf at hand: numbers (green; half of red and blue less green), and positions on the octahedron in
-    // steps of the finest level.
+    // Of the vertices of the leaf at hand: numbers (green; half of red and blue less green), and positions on the
+    // octahedron in steps of the finest level.
     this.numbers = [0, 1, 2].map(() => new Int32Array(NO_VERTEX));
     [this.xs, this.ys, this.zs] = [0, 1, 2].map(() => new Int16Array(NO_VERTEX));
     const unit = this.unit = 1 << facts.max_level;
@@ -135,7 +136,7 @@ class Distributions {
     this.side = 2 * unit + 1;
     this.stamps = new Int32Array(2 * this.side ** 2).fill(-1);
     this.vertexAt = new Uint16Array(2 * this.side ** 2);
-    // Its triangles: corners and midpoints of each; which children are divided, −1 for triangles that are not themselves.
+    // Its triangles: corners and midpoints of each; which children are divided, −1 for those that are not themselves.
     this.divided = { six: new Uint16Array(6 * NO_VERTEX), mask: new Int8Array(NO_VERTEX), count: 0 };
     this.kept = { six: new Uint16Array(6 * NO_VERTEX), mask: new Int8Array(NO_VERTEX), count: 0 };
     for (this.leaf = 0; this.leaf < this.faces.length; this.leaf++) {
@@ -282,7 +283,8 @@ class Distributions {
 // Everything that is shown.
 async function unpackScene(text) {
   const { facts, sections } = await unpack(text);
-  const [diffuse, glossy] = ["diffuse", "glossy"].map((name, i) => unpackList(sections, name, facts.lists[i], facts.lattice));
+  const [diffuse, glossy] =
+    ["diffuse", "glossy"].map((name, i) => unpackList(sections, name, facts.lists[i], facts.lattice));
   const counts = sections.bytes("glossy.counts");
   glossy.normals = new Int16Array(sections.words("glossy.normals").buffer);
   glossy.ranges = new Uint32Array(2 * counts.length);

@@ -41,8 +41,8 @@ impl Lattice {
     }
 }
 
-/// Sorts the triangles of each batch by place, along a curve that fills the box (G. Morton, 1966): the page leaves out runs
-/// of triangles that are not in the picture.
+/// Sorts the triangles of each batch by place, along a curve that fills the box (G. Morton, 1966): the page leaves out
+/// runs of triangles that are not in the picture.
 pub(super) fn gather(mesh: &mut DisplayMesh) {
     // Cells of 1/32 of the box.
     const BITS: u32 = 5;

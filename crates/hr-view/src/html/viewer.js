@@ -55,7 +55,9 @@ class Viewer {
     this.stops = 0;
     this.frame = { asked: false, last: null, time: 0, evaluated: 0 };
     document.title = `${facts.name} — hr-view`;
-    facts.cameras.forEach(([name], i) => element("cameras").add(new Option(i < 10 ? `${(i + 1) % 10}  ${name}` : name, i)));
+    facts.cameras.forEach(([name], i) => {
+      element("cameras").add(new Option(i < 10 ? `${(i + 1) % 10}  ${name}` : name, i));
+    });
     for (const [keys, action] of KEYS) {
       const [term, detail] = [document.createElement("dt"), document.createElement("dd")];
       [term.textContent, detail.textContent] = [keys, action];
@@ -95,7 +97,10 @@ class Viewer {
       setState("ready");
       this.redraw();
     });
-    element("cameras").addEventListener("change", (event) => { this.take(Number(event.target.value)); canvas.focus(); });
+    element("cameras").addEventListener("change", (event) => {
+      this.take(Number(event.target.value));
+      canvas.focus();
+    });
     element("help-button").addEventListener("click", () => { this.toggle("help"); canvas.focus(); });
     element("stops").addEventListener("input", (event) => { this.expose(Number(event.target.value)); });
     element("breadth").addEventListener("input", (event) => { this.widen(Number(event.target.value)); });
@@ -255,6 +260,7 @@ class Viewer {
     const triangles = (picture.diffuse.indices.length + picture.glossy.indices.length) / 3;
     const glossy = picture.glossy.places.length / 3;
     const stops = `${this.stops >= 0 ? "+" : ""}${this.stops.toFixed(1)} EV`;
-    element("line").textContent = `${facts.name}   ${rate}${triangles} triangles   glossy ${frame.evaluated} of ${glossy} vertices   ${stops}   H help`;
+    const evaluated = `glossy ${frame.evaluated} of ${glossy} vertices`;
+    element("line").textContent = `${facts.name}   ${rate}${triangles} triangles   ${evaluated}   ${stops}   H help`;
   }
 }

@@ -14,7 +14,8 @@ const [chromium, width, height, folder, page, ...broken] = process.argv.slice(2)
 const profile = mkdtempSync(join(tmpdir(), "hr-view-browser-"));
 const browser = spawn(chromium, [
   "--headless=new", "--no-sandbox", "--remote-debugging-pipe", `--user-data-dir=${profile}`, "--no-first-run",
-  "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--force-color-profile=srgb", "about:blank",
+  "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--force-color-profile=srgb",
+  "about:blank",
 ], { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
 process.on("exit", () => {
   browser.kill("SIGKILL");
@@ -50,7 +51,8 @@ const send = (method, params = {}) => new Promise((resolve, reject) => {
 });
 const rest = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const ask = async (expression) => {
-  const { result, exceptionDetails } = await send("Runtime.evaluate", { expression, awaitPromise: true, returnByValue: true });
+  const options = { awaitPromise: true, returnByValue: true };
+  const { result, exceptionDetails } = await send("Runtime.evaluate", { expression, ...options });
   if (exceptionDetails) {
     throw new Error(`${expression}: ${exceptionDetails.exception?.description}`);
   }
@@ -58,7 +60,15 @@ const ask = async (expression) => {
 };
 
 // How often the page asked for a frame.
-const COUNTER = "self.frames = 0; { const real = requestAnimationFrame; self.requestAnimationFrame = (f) => { frames++; return real(f); }; }";
+const COUNTER = `
+  self.frames = 0;
+  const real = requestAnimationFrame;
+  self.requestAnimationFrame = (f) => { frames++; return real(f); };
+`;
+const MESSAGE = `(() => {
+  const place = document.getElementById("message");
+  return place ? place.hidden ? "" : place.textContent : document.documentElement.textContent;
+})()`;
 
 async function open(path) {
   faults = [];
@@ -67,7 +77,7 @@ async function open(path) {
   for (let state; performance.now() - begin < 60_000; await rest(20)) {
     state = await ask("document.readyState === 'complete' ? document.documentElement.dataset.state ?? 'nothing' : ''");
     if (["ready", "failed", "nothing"].includes(state)) {
-      const message = await ask("{ const place = document.getElementById('message'); place ? place.hidden ? '' : place.textContent : document.documentElement.textContent }");
+      const message = await ask(MESSAGE);
       return { state, message, seconds: (performance.now() - begin) / 1000 };
     }
   }
@@ -102,7 +112,8 @@ const { targetId } = await send("Target.createTarget", { url: "about:blank" });
 ({ sessionId: session } = await send("Target.attachToTarget", { targetId, flatten: true }));
 await Promise.all(["Runtime", "Log", "Page"].map((domain) => send(`${domain}.enable`)));
 await send("Page.addScriptToEvaluateOnNewDocument", { source: COUNTER });
-const resize = (w, h) => send("Emulation.setDeviceMetricsOverride", { width: w, height: h, deviceScaleFactor: 1, mobile: false });
+const resize = (width, height) =>
+  send("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: false });
 await resize(Number(width), Number(height));
 
 const said = await open(page);
@@ -123,14 +134,16 @@ const moved = async (name, act) => {
   moves[name] = data !== last;
   last = data;
 };
-const mouse = (type, x, y, more = {}) => send("Input.dispatchMouseEvent", { type, x, y, button: "left", buttons: 1, clickCount: 1, ...more });
+const mouse = (type, x, y) =>
+  send("Input.dispatchMouseEvent", { type, x, y, button: "left", buttons: 1, clickCount: 1 });
 await moved("keys", () => press("KeyD", 200));
 await moved("mouse", async () => {
   await mouse("mousePressed", 100, 100);
   await mouse("mouseMoved", 140, 110);
   await mouse("mouseReleased", 140, 110);
 });
-const touch = (type, ...points) => send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
+const touch = (type, ...points) =>
+  send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
 await send("Emulation.setTouchEmulationEnabled", { enabled: true, maxTouchPoints: 2 });
 await moved("touch", async () => {
   await touch("touchStart", [100, 100]);
@@ -142,7 +155,7 @@ await moved("pinch", async () => {
   await touch("touchMove", [80, 100], [160, 100]);
   await touch("touchEnd");
 });
-await moved("exposure", () => press("Backspace").then(() => ask("dispatchEvent(new KeyboardEvent('keydown', { key: '+' }))")));
+await moved("exposure", () => ask("dispatchEvent(new KeyboardEvent('keydown', { key: '+' }))"));
 await press("KeyH");
 const help = await ask("!document.getElementById('help').hidden && document.getElementById('keys').children.length");
 await press("KeyH");
@@ -162,10 +175,11 @@ const wrong = faults;
 
 // A device that is taken away and given back.
 const begun = await picture();
-await ask("self.taken = document.getElementById('picture').getContext('webgl2').getExtension('WEBGL_lose_context'), taken.loseContext()");
+await ask("self.device = document.getElementById('picture').getContext('webgl2').getExtension('WEBGL_lose_context')");
+await ask("device.loseContext()");
 await rest(200);
 const lost = await ask("document.documentElement.dataset.state");
-await ask("taken.restoreContext()");
+await ask("device.restoreContext()");
 await rest(200);
 const restored = lost === "waiting" && (await picture()).data === begun.data;
 
@@ -173,5 +187,6 @@ const damage = [];
 for (const path of broken) {
   damage.push(await open(path));
 }
-console.log(JSON.stringify({ ...said, faults: wrong, still: still.name, second: second.name, idle, moves, help, rate, restored, damage }));
+const shown = { still: still.name, second: second.name };
+console.log(JSON.stringify({ ...said, ...shown, faults: wrong, idle, moves, help, rate, restored, damage }));
 process.exit(0);
