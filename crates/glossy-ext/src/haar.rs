@@ -38,11 +38,13 @@
 mod combine;
 mod half;
 mod mesh;
+mod outline;
 mod project;
 #[cfg(test)]
 mod tests;
 mod triangle;
 
+pub use outline::Outline;
 pub use project::{Beyond, Known, Peak, Projected, Refinement, Refiner, Support};
 
 use crate::Rgb;

@@ -3,6 +3,7 @@
 use crate::ViewError;
 use crate::args::Args;
 use crate::glossy::Mode;
+use crate::html;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::raycast::RayCaster;
@@ -43,6 +44,7 @@ enum Output {
     Window,
     Image(PathBuf),
     Frames(PathBuf),
+    Html(PathBuf),
 }
 
 impl Output {
@@ -53,6 +55,10 @@ impl Output {
             ImageKind::of(path)?;
             has_folder(path)?;
             return Ok(Self::Image(path.clone()));
+        }
+        if let Some(path) = &args.html {
+            has_folder(path)?;
+            return Ok(Self::Html(path.clone()));
         }
         if let Some(folder) = &args.frames {
             make_folder(folder)?;
@@ -110,6 +116,7 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
         Output::Window => show.window(),
         Output::Image(path) => show.image(&path),
         Output::Frames(folder) => show.frames(&folder),
+        Output::Html(path) => show.html(&path),
     }
 }
 
@@ -188,6 +195,12 @@ impl Show<'_> {
         let watch = |share| self.progress.at("taking the picture", share);
         let image = self.caster().render(&scene.default_camera(), &watch);
         image.save(path, &ToneMap::default(), scene.primaries)?;
+        self.write_stats()
+    }
+
+    fn html(&self, path: &Path) -> Result<(), ViewError> {
+        self.progress.at("writing the page", 0.0);
+        html::write(&self.solved, path)?;
         self.write_stats()
     }
 

@@ -62,8 +62,8 @@ pub struct Args {
     #[arg(long, value_name = "IN")]
     pub load: Option<PathBuf>,
 
-    /// One self-contained file that walks through the solution in a browser (not available yet)
-    #[arg(long, value_name = "OUT.html")]
+    /// No window: one self-contained file that walks through the solution in any browser
+    #[arg(long, value_name = "OUT.html", conflicts_with_all = ["image", "frames"])]
     pub html: Option<PathBuf>,
 }
 
@@ -89,9 +89,12 @@ impl Args {
             }
             Err(error) => return Err(ViewError::Arguments(one_line(&error))),
         };
-        let later = [("--save", &args.save), ("--load", &args.load), ("--html", &args.html)];
+        let later = [("--save", &args.save), ("--load", &args.load)];
         if let Some((option, _)) = later.iter().find(|(_, value)| value.is_some()) {
             return Err(ViewError::Arguments(format!("{option} is not available yet; use --image or --frames")));
+        }
+        if args.html.is_some() && args.mode != Mode::Distributions {
+            return Err(ViewError::Arguments("--html shows distributions; leave --mode out".into()));
         }
         Ok(Parsed::Run(Box::new(args)))
     }
@@ -192,7 +195,8 @@ mod tests {
             ("--mode gather", "not available yet"),
             ("--save x", "not available yet"),
             ("--load x", "not available yet"),
-            ("--html x", "not available yet"),
+            ("--html x --mode samples", "leave --mode out"),
+            ("--html x --image a.png", "--image"),
         ];
         for (line, hint) in cases {
             let Err(error) = read(line) else { panic!("'{line}' was taken") };

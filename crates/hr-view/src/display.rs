@@ -172,13 +172,18 @@ pub trait Walkable: Send + Sync {
     /// The direction that stays up while walking, unit length: by default the coordinate axis nearest to the first
     /// camera's up, and z without a camera.
     fn up(&self) -> DVec3 {
-        nearest_axis(self.cameras().first().map_or(DVec3::Z, |(_, camera)| DVec3::from(camera.up)))
+        up_of(self.cameras())
     }
 
     /// Radiance (W/(m² sr)) toward an eye (in scene units), beside the diffuse part and emission. `vertices` are
     /// positions in [`DisplayMesh::glossy`]; `out`, equally long, takes the results. Called from several threads at
     /// once, with different vertices.
     fn glossy_radiance(&self, eye: DVec3, vertices: &[u32], out: &mut [Rgb]);
+}
+
+/// The signed coordinate axis nearest to the first camera's up; z without a camera.
+pub(crate) fn up_of(cameras: &[(String, Camera)]) -> DVec3 {
+    nearest_axis(cameras.first().map_or(DVec3::Z, |(_, camera)| DVec3::from(camera.up)))
 }
 
 /// The signed coordinate axis nearest to `v`; z where `v` is zero or not finite.

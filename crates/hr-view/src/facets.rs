@@ -13,16 +13,26 @@ use std::collections::HashMap;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-/// A chord of a curved surface spans at most this angle (radians, 8°) …
-const FINE: f32 = 0.14;
-/// … unless it leaves the surface by less than this (unit space: 0.5 mm in a room of 10 m) …
-const FLAT_ENOUGH: f32 = 5e-5;
-/// … and then at most this (radians, 20°).
-const COARSE: f32 = 0.35;
+/// How round curved surfaces are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Roundness {
+    /// A chord of a curved surface spans at most this angle (radians) …
+    pub fine: f32,
+    /// … unless it leaves the surface by less than this (share of the scene's size) …
+    pub flat_enough: f32,
+    /// … and then at most this (radians).
+    pub coarse: f32,
+}
+
+impl Roundness {
+    /// 8°, or 20° within 0.5 mm in a room of 10 m.
+    pub const SMOOTH: Self = Self { fine: 0.14, flat_enough: 5e-5, coarse: 0.35 };
+}
+
 /// Edges this near to their surface (unit space) are never cut: rounding bends very short ones at random.
 const NEGLIGIBLE: f32 = 1e-6;
-/// An edge is halved at most so often: a full turn to less than a degree and a half.
-const MOST_CUTS: u32 = 8;
+/// A triangle is halved at most so often: each of its edges 8 times, a full turn to less than a degree and a half.
+const MOST_CUTS: u32 = 24;
 /// No index.
 const NONE: u32 = u32::MAX;
 
@@ -39,8 +49,8 @@ pub struct Source {
 
 /// Makes the triangles that show a solution, and for each of [`DisplayMesh::glossy`] where its light comes from.
 #[must_use]
-pub fn facets(scene: &Scene, solution: &Solution<GlossyField>) -> (DisplayMesh, Vec<Source>) {
-    let mut maker = Maker::new(scene, solution);
+pub fn facets(scene: &Scene, solution: &Solution<GlossyField>, roundness: Roundness) -> (DisplayMesh, Vec<Source>) {
+    let mut maker = Maker::new(scene, solution, roundness);
     for leaf in solution.elements.patch_leaves() {
         maker.leaf(leaf);
     }
@@ -57,6 +67,15 @@ struct Point {
     /// In unit space.
     at: Vec3,
     index: u32,
+}
+
+/// The middle of an edge that leaves its surface.
+struct Bend {
+    uv: Vec2,
+    /// On the surface, in unit space.
+    at: Vec3,
+    /// From the edge, in unit space.
+    distance: f32,
 }
 
 /// What the triangles of one leaf have in common.
@@ -81,6 +100,7 @@ struct Look<'a> {
 struct Maker<'a> {
     scene: &'a Scene,
     solution: &'a Solution<GlossyField>,
+    roundness: Roundness,
     mesh: DisplayMesh,
     sources: Vec<Source>,
     /// Triangles per batch.
@@ -98,7 +118,7 @@ struct Maker<'a> {
 }
 
 impl<'a> Maker<'a> {
-    fn new(scene: &'a Scene, solution: &'a Solution<GlossyField>) -> Self {
+    fn new(scene: &'a Scene, solution: &'a Solution<GlossyField>, roundness: Roundness) -> Self {
         let mut textures: Vec<Texture> = Vec::new();
         let texture_of = scene.materials.iter().map(|material| {
             let Some(texture) = &material.texture else { return 0 };
@@ -117,6 +137,7 @@ impl<'a> Maker<'a> {
         Self {
             scene,
             solution,
+            roundness,
             batches: vec![Vec::new(); textures.len() + 1],
             mesh: DisplayMesh { textures, ..mesh },
             sources: Vec::new(),
@@ -177,45 +198,36 @@ impl<'a> Maker<'a> {
         Point { uv: corner.uv, at, index: self.vertex(look, corner.vertex, corner.uv) }
     }
 
-    /// A triangle counter-clockwise in (u, v), whose edges may be halved so many times more.
+    /// A triangle counter-clockwise in (u, v), which may be halved so many times more.
+    ///
+    /// Of the edges that leave the surface too far the worst one is cut: around a cylinder that makes few triangles, all of
+    /// its length. The others are cut later, so that in the end all such edges are.
     fn triangle(&mut self, look: &Look, corners: [Point; 3], cuts: u32) {
-        let [a, b, c] = corners;
-        let mut middles = [None; 3];
-        if cuts > 0 {
-            for (i, middle) in middles.iter_mut().enumerate() {
-                *middle = self.middle(look, &corners[i], &corners[(i + 1) % 3]);
-            }
+        // Nothing is left of what has an edge in a pole.
+        let is_point = |a: &Point, b: &Point| a.index == b.index && a.uv.y == b.uv.y && is_pole(look.geometry, a.uv);
+        if (0..3).any(|i| is_point(&corners[i], &corners[(i + 1) % 3])) {
+            return;
         }
-        let next = cuts.saturating_sub(1);
-        match middles {
-            [None, None, None] => self.emit(look, [a.index, b.index, c.index]),
-            [Some(ab), Some(bc), Some(ca)] => {
-                for part in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
-                    self.triangle(look, part, next);
-                }
-            }
-            // One or two: turned until the edge before the uncut one comes first.
-            [Some(m), None, other] => self.halves(look, [a, b, c], m, other, next),
-            [other, Some(m), None] => self.halves(look, [b, c, a], m, other, next),
-            [None, other, Some(m)] => self.halves(look, [c, a, b], m, other, next),
-        }
+        let bends = (0..3).filter_map(|i| Some((i, self.bend(look, &corners[i], &corners[(i + 1) % 3])?)));
+        let worst = bends.max_by(|(_, a), (_, b)| a.distance.total_cmp(&b.distance)).filter(|_| cuts > 0);
+        let Some((edge, bend)) = worst else {
+            return self.emit(look, corners.map(|corner| corner.index));
+        };
+        let [a, b, c] = [0, 1, 2].map(|i| corners[(edge + i) % 3]);
+        let middle = self.middle(look, &bend);
+        self.triangle(look, [middle, b, c], cuts - 1);
+        self.triangle(look, [a, middle, c], cuts - 1);
     }
 
-    /// A triangle whose first edge is cut, its second is not, its third may be.
-    fn halves(&mut self, look: &Look, [a, b, c]: [Point; 3], m: Point, other: Option<Point>, cuts: u32) {
-        self.triangle(look, [m, b, c], cuts);
-        match other {
-            None => self.triangle(look, [a, m, c], cuts),
-            Some(n) => {
-                self.triangle(look, [a, m, n], cuts);
-                self.triangle(look, [m, c, n], cuts);
-            }
+    /// How an edge leaves the surface; `None` where that is little enough.
+    fn bend(&self, look: &Look, a: &Point, b: &Point) -> Option<Bend> {
+        let mut uv = 0.5 * (a.uv + b.uv);
+        // From a pole all directions are meridians; it is at any u.
+        if is_pole(look.geometry, a.uv) {
+            uv.x = b.uv.x;
+        } else if is_pole(look.geometry, b.uv) {
+            uv.x = a.uv.x;
         }
-    }
-
-    /// The vertex in the middle of an edge, where the surface leaves the edge too far.
-    fn middle(&mut self, look: &Look, a: &Point, b: &Point) -> Option<Point> {
-        let uv = 0.5 * (a.uv + b.uv);
         let at = look.geometry.point(uv);
         let (chord, off) = (b.at - a.at, at - a.at);
         let length = chord.length();
@@ -223,9 +235,13 @@ impl<'a> Maker<'a> {
             if length > 0.0 { (off - chord * (off.dot(chord) / (length * length))).length() } else { off.length() };
         // An arc of a small angle t over a chord of length 1 is t/8 high.
         let angle = if length > 0.0 { 8.0 * distance / length } else { f32::INFINITY };
-        if distance < NEGLIGIBLE || angle < if distance < FLAT_ENOUGH { COARSE } else { FINE } {
-            return None;
-        }
+        let Roundness { fine, flat_enough, coarse } = self.roundness;
+        let much = distance >= NEGLIGIBLE && angle >= if distance < flat_enough { coarse } else { fine };
+        much.then_some(Bend { uv, at, distance })
+    }
+
+    /// The vertex in the middle of an edge that is cut.
+    fn middle(&mut self, look: &Look, &Bend { uv, at, .. }: &Bend) -> Point {
         // Adding zero makes −0 the same as 0.
         let key = ((at + Vec3::ZERO).to_array().map(f32::to_bits), look.surface, look.back);
         let index = match self.cut.get(&key) {
@@ -241,7 +257,7 @@ impl<'a> Maker<'a> {
                 index
             }
         };
-        Some(Point { uv, at, index })
+        Point { uv, at, index }
     }
 
     fn emit(&mut self, look: &Look, [a, b, c]: [u32; 3]) {
@@ -371,6 +387,12 @@ impl<'a> Maker<'a> {
 /// Whether edges of parts may be round; a disk's outline is, though it is flat.
 fn is_round(geometry: &Geometry) -> bool {
     matches!(geometry, Geometry::Revolution(_))
+}
+
+/// Whether the surface has the same point at all u.
+fn is_pole(geometry: &Geometry, uv: Vec2) -> bool {
+    let distance = |u: f32| geometry.point(uv).distance(geometry.point(Vec2::new(u, uv.y)));
+    distance(uv.x + 0.25) < NEGLIGIBLE && distance(uv.x + 0.5) < NEGLIGIBLE
 }
 
 /// Whether a surface hides its own back, from everywhere but the inside of a solid.

@@ -33,13 +33,25 @@ fn leaving(solution: &Solution<GlossyField>, leaf: NodeId, normal: Vec3, away: V
     let weight = away.dot(axis).max(LEAST_COSINE);
     let distribution = &solution.reflected[leaf.index()];
     if distribution.is_empty() {
-        // Carried as diffuse light.
-        let albedo = solution.field.active(element.material).unwrap_or(Rgb::ZERO);
-        return (solution.exitant.irradiance[leaf.index()] * albedo * FRAC_1_PI, weight);
+        return (carried(solution, leaf), weight);
     }
     let light = distribution.eval(away);
     // Elsewhere it is intensity per area.
     (if element.is_flat() { light } else { light / weight }, weight)
+}
+
+/// Radiance of a leaf without a distribution, whose glossy light is carried as diffuse light.
+pub(crate) fn carried(solution: &Solution<GlossyField>, leaf: NodeId) -> Rgb {
+    let albedo = solution.field.active(solution.elements.nodes[leaf.index()].material).unwrap_or(Rgb::ZERO);
+    solution.exitant.irradiance[leaf.index()] * albedo * FRAC_1_PI
+}
+
+/// The leaves around some vertices and their shares, some more than once. What lies below something is not seen.
+pub(crate) fn shares(solution: &Solution<GlossyField>, corners: &[(u32, f32)]) -> impl Iterator<Item = (u32, f32)> {
+    corners.iter().filter(|(_, share)| *share > 0.0).flat_map(move |&(vertex, share)| {
+        let around = solution.vertices.leaves_around(vertex);
+        around.iter().map(move |&leaf| (leaf, solution.elements.exposed(leaf) * share / around.len() as f32))
+    })
 }
 
 /// Radiance from the distributions around some vertices of a leaf, interpolated with the weights given (paper, section
@@ -47,15 +59,10 @@ fn leaving(solution: &Solution<GlossyField>, leaf: NodeId, normal: Vec3, away: V
 #[must_use]
 pub fn interpolated(solution: &Solution<GlossyField>, corners: &[(u32, f32)], normal: Vec3, away: Vec3) -> Rgb {
     let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
-    for &(vertex, share) in corners.iter().filter(|(_, share)| *share > 0.0) {
-        let around = solution.vertices.leaves_around(vertex);
-        for &leaf in around {
-            let (light, weight) = leaving(solution, NodeId(leaf), normal, away);
-            // What lies below something is not seen.
-            let weight = weight * solution.elements.exposed(leaf) * share / around.len() as f32;
-            sum += light * weight;
-            weights += weight;
-        }
+    for (leaf, share) in shares(solution, corners) {
+        let (light, weight) = leaving(solution, NodeId(leaf), normal, away);
+        sum += light * weight * share;
+        weights += weight * share;
     }
     sum / weights.max(f32::MIN_POSITIVE)
 }

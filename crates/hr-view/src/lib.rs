@@ -6,6 +6,7 @@ pub mod display;
 pub mod error;
 pub mod facets;
 pub mod glossy;
+pub mod html;
 pub mod interrupt;
 pub mod progress;
 pub mod raycast;

@@ -1,7 +1,7 @@
 //! A solution, ready to be walked through.
 
 use crate::display::{DisplayMesh, Walkable};
-use crate::facets::{Source, facets};
+use crate::facets::{Roundness, Source, facets};
 use crate::glossy::{self, Mode};
 use crate::solved::Solved;
 use glam::{DVec3, Vec3};
@@ -29,7 +29,7 @@ impl<'a> Walkthrough<'a> {
     /// vertex; perfect mirrors, which samples cannot show, keep their distributions.
     #[must_use]
     pub fn new(solved: &'a Solved, mode: Mode) -> Self {
-        let (mesh, sources) = facets(&solved.scene, &solved.solution);
+        let (mesh, sources) = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
         Self { solved, mode, mesh, sources }
     }
 

@@ -6,12 +6,12 @@
 mod app;
 mod gpu;
 mod hud;
-mod lists;
+pub(crate) mod lists;
 mod refresh;
 mod scene_buffers;
 mod snapshot;
 mod textures;
-mod tone;
+pub(crate) mod tone;
 mod view;
 mod walker;
 

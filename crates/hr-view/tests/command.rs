@@ -26,7 +26,7 @@ fn mistakes_are_status_1_and_one_line() {
         (&["--camera", "no-such-camera.json"], "no-such-camera.json"),
         (&["--image", "picture.gif"], ".png"),
         (&["--error", "2"], "0.001"),
-        (&["--html", "a.html"], "not available yet"),
+        (&["furnace", "--html", "no/such/folder/a.html"], "no/such/folder/a.html"),
         (&["--mode", "gather", "--image", "a.png"], "not available yet"),
         (&["furnace", "--image", "no/such/folder/a.png"], "no/such/folder/a.png"),
         (&["furnace", "--error", "0.9", "--frames", "/dev/null/frames"], "/dev/null/frames"),
@@ -130,6 +130,23 @@ fn pictures_have_the_cameras_size_and_the_right_light() {
     }
     let png = image::open(folder.path("a.png")).expect("a PNG file");
     assert_eq!((png.width(), png.height()), (24, 16), "size of the PNG file");
+}
+
+#[test]
+fn pages_are_whole() {
+    let folder = Folder::new("page");
+    let page = folder.path("page.html");
+    let stats = folder.path("stats.json");
+    succeeds(&["cornell", "--error", "0.5", "--html", &page, "--stats", &stats]);
+    let text = std::fs::read_to_string(&page).expect("the page was written");
+    assert!(text.starts_with("<!DOCTYPE html>") && text.trim_end().ends_with("</html>"), "from begin to end");
+    assert!(!text.contains("<!-- "), "every part is in its place");
+    let start = text.find(r#"id="solution">"#).expect("the solution's element") + 14;
+    let data = text[start..].split_once("</script>").expect("its end").0.trim();
+    // The first bytes of a gzip file.
+    assert!(data.len() > 1000 && data.starts_with("H4sI"), "the solution is in it: {} letters", data.len());
+    let stats = std::fs::read_to_string(stats).expect("statistics were written");
+    assert!(stats.contains("\"display\""), "statistics come with pages, too: {stats}");
 }
 
 #[test]

@@ -4,17 +4,17 @@ use crate::display::{Batch, DisplayMesh};
 
 /// Some of a mesh's triangles with their own, compact vertices.
 #[derive(Debug, Default, PartialEq)]
-pub(super) struct VertexList {
+pub(crate) struct VertexList {
     /// The mesh's vertex behind each of the list's.
-    pub(super) vertices: Vec<u32>,
+    pub(crate) vertices: Vec<u32>,
     /// Triangles, as positions in `vertices`.
-    pub(super) indices: Vec<u32>,
+    pub(crate) indices: Vec<u32>,
     /// The triangles by texture; no batch is empty.
-    pub(super) batches: Vec<Batch>,
+    pub(crate) batches: Vec<Batch>,
 }
 
 /// Splits a mesh into its diffuse and its glossy list.
-pub(super) fn split(mesh: &DisplayMesh) -> [VertexList; 2] {
+pub(crate) fn split(mesh: &DisplayMesh) -> [VertexList; 2] {
     let mut is_glossy = vec![false; mesh.positions.len()];
     for &vertex in &mesh.glossy {
         is_glossy[vertex as usize] = true;

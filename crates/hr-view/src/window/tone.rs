@@ -40,7 +40,7 @@ pub struct Tone {
 }
 
 /// Exposed values are cut here: far beyond white, and the curve's squares stay finite.
-pub(super) const BRIGHTEST: f32 = 1e6;
+pub(crate) const BRIGHTEST: f32 = 1e6;
 
 /// Exposed luminance of a scene's mean, as that of pictures in [`hr_scene::tonemap`]: the key of a normally lit scene in
 /// E. Reinhard et al., "Photographic Tone Reproduction for Digital Images", 2002.
@@ -71,12 +71,12 @@ impl Tone {
 }
 
 /// The nearest finite colour, black where not a number: shaders are not bound to carry infinities and NaN through.
-pub(super) fn finite(v: Rgb) -> Rgb {
+pub(crate) fn finite(v: Rgb) -> Rgb {
     Rgb::from_array(v.to_array().map(|x| if x.is_nan() { 0.0 } else { x.clamp(f32::MIN, f32::MAX) }))
 }
 
 /// The sRGB transfer function (IEC 61966-2-1) of a linear value in 0…1.
-pub(super) fn srgb_encode(x: f32) -> f32 {
+pub(crate) fn srgb_encode(x: f32) -> f32 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
