@@ -81,6 +81,11 @@ impl Gather {
         Self { groups, push, rows, arriving: Vec::new(), even: Vec::new() }
     }
 
+    /// Links that leaves do not look at closely, though they are for more than one leaf.
+    pub(crate) fn faint_links(&self) -> u64 {
+        self.push.faint_links
+    }
+
     /// Bytes of the weights that are kept.
     pub(crate) fn weight_bytes(&self) -> u64 {
         self.push.weight_bytes()

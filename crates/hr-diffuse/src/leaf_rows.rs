@@ -79,3 +79,38 @@ fn sees_sender<L: LightField>(light: Light<'_, L>, leaf: u32, ray: u32) -> bool 
     let met = hit.and_then(|hit| light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv));
     met.is_some_and(|leaf| light.emitted_most(leaf.0) > 0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factors(shares: [f32; 2], exposed: f32, closed: bool) -> [f32; 3] {
+        LeafRow { shares, exposed, closed }.factors()
+    }
+
+    #[test]
+    fn rows_of_enclosures_are_filled_and_no_others() {
+        assert_eq!(factors([0.2, 0.5], 1.0, false), [1.0; 3], "there may be sky");
+        let [lights, emitters, rest] = factors([0.2, 0.64], 1.0, true);
+        assert!((0.2 * emitters + 0.64 * rest - 1.0).abs() < 1e-6, "all there is to see: {emitters}, {rest}");
+        assert!(lights == 1.0 && (emitters - 1.0).abs() < 1e-6, "links to emitters are fine: {emitters}");
+        let [_, emitters, rest] = factors([0.9, 0.0], 1.0, true);
+        assert!((emitters * 0.9 - 1.0).abs() < 1e-6 && rest.is_finite(), "nothing else could be what is missing");
+    }
+
+    #[test]
+    fn rows_never_exceed_what_is_open() {
+        for exposed in [0.0, 0.5, 1.0] {
+            for closed in [false, true] {
+                for emitters in [0.0, 1e-30, 0.3, 1.0, 7.0] {
+                    for rest in [0.0, 1e-30, 0.4, 1.0, 9.0] {
+                        let [lights, all, others] = factors([emitters, rest], exposed, closed);
+                        let sum = emitters * all + rest * others;
+                        assert!((0.0..=1.000_001).contains(&sum), "{emitters}, {rest}, {exposed}, {closed}: {sum}");
+                        assert!(lights.is_finite() && lights >= 0.0, "{lights}");
+                    }
+                }
+            }
+        }
+    }
+}

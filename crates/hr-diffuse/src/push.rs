@@ -63,6 +63,8 @@ pub(crate) struct Push {
     error: f32,
     /// By link: what it brings if it is wholly visible, where it is looked at closely (sum of channels).
     means: Vec<f32>,
+    /// Links that would be looked at closely if they brought more.
+    pub(crate) faint_links: u64,
     /// Where the weights of each leaf begin; as many leaves as have kept ones, and the end of the last.
     first: Vec<usize>,
     /// By leaf, then by node from the leaf up to the root, then by those links of the node that are not spread evenly.
@@ -83,8 +85,20 @@ impl Push {
         let leaves: Vec<u32> = light.elements.patch_leaves().collect();
         let spreads = links.all().par_iter().with_min_len(256).map(|link| spread(light, link, error));
         let (spreads, means) = spreads.unzip();
-        let mut push =
-            Self { leaves, spreads, error: error.unwrap_or_default(), means, first: vec![0], weights: Vec::new() };
+        let mut push = Self {
+            leaves,
+            spreads,
+            error: error.unwrap_or_default(),
+            means,
+            faint_links: 0,
+            first: vec![0],
+            weights: Vec::new(),
+        };
+        if error.is_some() {
+            let faint =
+                |(link, spread): &(&Link, &Spread)| **spread != Spread::Exact && is_shared(light, link.receiver);
+            push.faint_links = links.all().iter().zip(&push.spreads).filter(faint).count() as u64;
+        }
         // How many weights a leaf has, by node: its own and those of all above it.
         let mut counts = vec![0_u32; light.elements.nodes.len()];
         for (node, element) in light.elements.nodes.iter().enumerate() {
@@ -183,11 +197,18 @@ impl Push {
     }
 }
 
+/// Whether what a node received means different things to its leaves, or to parts of it: not where a link's factor is the mean
+/// over the leaf itself.
+fn is_shared<L: LightField>(light: Light<'_, L>, node: u32) -> bool {
+    let element = light.element(node);
+    !element.is_flat() || element.child_count > 0
+}
+
 /// How a link's light is to be spread, and what it brings if it is wholly visible.
 fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -> (Spread, f32) {
     let receiver = light.element(link.receiver);
     let even = if receiver.is_flat() { Spread::Even } else { Spread::Plain };
-    let Some(error) = error.filter(|_| !receiver.is_flat() || receiver.child_count > 0) else { return (even, 0.0) };
+    let Some(error) = error.filter(|_| is_shared(light, link.receiver)) else { return (even, 0.0) };
     let direction = light.direction_to(receiver.center, link.sender);
     let mean = light.emitted(link.sender, -direction).element_sum() * link.factor;
     let faint = FAINT_SHARE * error * light.exitant.irradiance[link.receiver as usize].element_sum();
@@ -312,3 +333,6 @@ fn sample_points(scene: &SceneData, element: &Element) -> SmallVec<[(Vec3, Vec3,
     let points = geometry.quadrature(element.domain);
     points.into_iter().map(|(uv, weight)| (geometry.point(uv), geometry.normal(uv) * side, weight)).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -11,12 +11,20 @@ pub(crate) struct Skips {
     pub(crate) averted: bool,
     pub(crate) sealed_sides: bool,
     pub(crate) converged_leaves: bool,
+    /// A look from each leaf at links that bring next to nothing.
+    pub(crate) faint_links: bool,
 }
 
 impl Skips {
-    pub(crate) const ALL: Self =
-        Self { black_receivers: true, facing: true, averted: true, sealed_sides: true, converged_leaves: true };
+    pub(crate) const ALL: Self = Self {
+        black_receivers: true,
+        facing: true,
+        averted: true,
+        sealed_sides: true,
+        converged_leaves: true,
+        faint_links: true,
+    };
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -368,9 +368,10 @@ impl<L: LightField> Solver<L> {
     /// are as fine as they will be.
     pub(crate) fn prepare(&mut self, closely: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         let start = Instant::now();
-        let error = closely.then_some(self.settings.error);
+        let error = closely.then_some(if self.skips.faint_links { self.settings.error } else { 0.0 });
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
         self.gather = Gather::new(self.light(), &self.links, error, room, watch);
+        self.stats.skipped.faint_links = self.gather.faint_links();
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 

@@ -50,6 +50,8 @@ pub struct Skipped {
     pub sealed_sides: u64,
     /// Leaves whose incident light did not change enough to be reflected anew.
     pub converged_leaves: u64,
+    /// Links that bring so little that leaves do not look for themselves what they bring there.
+    pub faint_links: u64,
 }
 
 impl std::ops::AddAssign for Skipped {
@@ -60,6 +62,7 @@ impl std::ops::AddAssign for Skipped {
         self.proved_free += other.proved_free;
         self.sealed_sides += other.sealed_sides;
         self.converged_leaves += other.converged_leaves;
+        self.faint_links += other.faint_links;
     }
 }
 

@@ -60,6 +60,7 @@ pub fn stats(solved: &Solved, asked: f32, error: f32, times: &Times) -> Value {
             "proved_free": skipped.proved_free,
             "sealed_sides": skipped.sealed_sides,
             "converged_leaves": skipped.converged_leaves,
+            "faint_links": skipped.faint_links,
         },
         "stopped": stats.stopped,
         "budget_spent": stats.spent.map(|spent| match spent {

@@ -14,7 +14,7 @@ const BLACK: u32 = 2;
 const SOLID: u32 = 3;
 
 /// A room with a lamp, a box, a ball and a post; a black sheet hangs in it. Nothing but the walls has two sides.
-fn room() -> SceneInput {
+pub(crate) fn room() -> SceneInput {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     let quad = |corner: DVec3, a: DVec3, b: DVec3| Shape::Quad([corner, corner + a, corner + a + b, corner + b]);
     let mut shapes = vec![
@@ -46,7 +46,7 @@ fn room() -> SceneInput {
     SceneInput { surfaces, materials, ..SceneInput::default() }
 }
 
-fn solve<L: LightField>(input: &SceneInput, error: f32, field: L, skips: Skips) -> Solver<L> {
+pub(crate) fn solve<L: LightField>(input: &SceneInput, error: f32, field: L, skips: Skips) -> Solver<L> {
     let mut solver = Solver::skipping(input, Settings::with_error(error), field, skips).expect("the room is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
     solver
@@ -121,6 +121,18 @@ fn pairs_that_hardly_face_each_other_change_little() {
     assert!(some < all, "{some} of {all} links");
     let apart = difference(&radiosities(&with), &radiosities(&without), with.exitant.radiosity[0]);
     assert!(apart < 0.2 * ERROR, "{apart} of the mean radiosity");
+}
+
+/// Links that bring next to nothing need no look from every leaf.
+#[test]
+fn faint_links_change_little() {
+    const ERROR: f32 = 0.1;
+    let with = solve(&room(), ERROR, (), Skips::ALL);
+    let without = solve(&room(), ERROR, (), Skips { faint_links: false, ..Skips::ALL });
+    let [some, none] = [&with, &without].map(|solver| solver.stats.skipped.faint_links);
+    assert!(some > 100 && none < some / 2, "{some}, then {none}: only what brings nothing at all");
+    let apart = difference(&radiosities(&with), &radiosities(&without), with.exitant.radiosity[0]);
+    assert!(apart < 0.5 * ERROR, "{apart} of the mean radiosity");
 }
 
 #[test]
