@@ -33,7 +33,7 @@ const MOST_WEIGHT: f32 = 8.0;
 const RAYS: f32 = 64.0;
 const MOST_RAYS: f32 = 16.0;
 /// Links none of whose segments was free let so much through, of which each leaf finds out what is true.
-const LEAST_VISIBLE: f32 = 0.05;
+const LEAST_VISIBLE: f32 = 0.01;
 
 /// Bytes that are kept for each link, …
 pub(crate) const LINK_BYTES: usize = size_of::<Spread>() + size_of::<f32>();
@@ -45,7 +45,7 @@ const BETWEEN_WATCHES: usize = 32;
 /// How a link's light is spread over the leaves below its receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Spread {
-    /// Evenly: the same irradiance for all.
+    /// Evenly: the same irradiance for all, or none.
     Even,
     /// By orientation and distance from the sender's middle.
     Plain,
@@ -207,7 +207,7 @@ fn is_shared<L: LightField>(light: Light<'_, L>, node: u32) -> bool {
 /// How a link's light is to be spread, and what it brings if it is wholly visible.
 fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -> (Spread, f32) {
     let receiver = light.element(link.receiver);
-    let even = if receiver.is_flat() { Spread::Even } else { Spread::Plain };
+    let even = if receiver.is_flat() || link.visibility == 0.0 { Spread::Even } else { Spread::Plain };
     let Some(error) = error.filter(|_| is_shared(light, link.receiver)) else { return (even, 0.0) };
     let direction = light.direction_to(receiver.center, link.sender);
     let mean = light.emitted(link.sender, -direction).element_sum() * link.factor;
