@@ -1,12 +1,12 @@
 //! The engine's form factors against closed forms and brute force.
 
 use crate::BenchError;
-use crate::path_tracer::{Sampler, cosine_hemisphere, power_heuristic};
 use crate::run::{Out, say};
 use glam::{DVec3, dvec3};
 use glossy_ext::Place;
 use hr_diffuse::form_factor::{Accuracy, Mean, Part, part_factor};
 use hr_diffuse::{Domain, Geometry, GeometryError, Normalization, Shape, Surface};
+use hr_view::path_tracer::{Sampler, cosine_hemisphere, power_heuristic};
 use std::f32::consts::FRAC_1_PI;
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! What the library is measured by: a reference path tracer, distances between images, and reports of accuracy and
+//! What the library is measured by: path-traced references, distances between images, and reports of accuracy and
 //! speed. Not published; the `hr-bench` command is its face.
 //!
 //! | subcommand | what it measures |
@@ -22,7 +22,6 @@ pub mod form_factors;
 pub mod growth;
 pub mod irradiance;
 pub mod measure;
-pub mod path_tracer;
 pub mod plot;
 pub mod run;
 pub mod threads;
@@ -30,7 +29,6 @@ pub mod views;
 pub mod visibility;
 
 pub use error::BenchError;
-pub use path_tracer::{PathTracer, Reference};
 
 use clap::Parser;
 use clap::error::ErrorKind;

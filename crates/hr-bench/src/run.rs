@@ -3,8 +3,9 @@
 use crate::args::{AccuracyArgs, Cli, Command, CompareArgs, ReferenceArgs, ThreadsArgs, VisibilityArgs};
 use crate::compare::{compare, luminance};
 use crate::views::{Making, listed, path_traced};
-use crate::{BenchError, PathTracer, accuracy, curve, float_image, form_factors, growth, threads, visibility};
+use crate::{BenchError, accuracy, curve, float_image, form_factors, growth, threads, visibility};
 use hr_scene::{Camera, ImageKind, Scene, ToneMap, builtin};
+use hr_view::path_tracer::{self, PathTracer};
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
@@ -53,20 +54,20 @@ fn reference(args: &ReferenceArgs, out: Out<'_>) -> Result<(), BenchError> {
     for path in std::iter::once(&args.image).chain(&args.sigma) {
         ImageKind::of(path)?;
     }
-    let scene = Arc::new(Scene::load(&args.scene)?);
+    let scene = Scene::load(&args.scene)?;
     let mut camera = camera(&scene, args.camera.as_deref())?;
     if let Some(width) = args.width {
         let height = f64::from(camera.height) * f64::from(width) / f64::from(camera.width);
         camera = Camera { width, height: (height.round() as u32).clamp(1, 16384), ..camera };
     }
-    let tracer = PathTracer::new(scene)?;
+    let visibility = path_tracer::visibility(&scene)?;
+    let tracer = PathTracer::new(&scene, &visibility);
     let start = Instant::now();
     let found = tracer.render(&camera, args.spp, args.seed, &|_| ());
     let seconds = start.elapsed().as_secs_f64();
-    let primaries = tracer.scene().primaries;
-    found.image.save(&args.image, &ToneMap::default(), primaries)?;
+    found.image.save(&args.image, &ToneMap::default(), scene.primaries)?;
     if let Some(path) = &args.sigma {
-        found.sigma.save(path, &ToneMap::default(), primaries)?;
+        found.sigma.save(path, &ToneMap::default(), scene.primaries)?;
     }
     let sum = |image: &hr_scene::Image| image.pixels.iter().map(|p| p.as_dvec3().element_sum()).sum::<f64>();
     let noise = 100.0 * sum(&found.sigma) / sum(&found.image).max(f64::MIN_POSITIVE);
@@ -103,9 +104,9 @@ fn measure_accuracy(args: &AccuracyArgs, out: Out<'_>) -> Result<(), BenchError>
 }
 
 fn measure_visibility(args: &VisibilityArgs, out: Out<'_>) -> Result<(), BenchError> {
-    let scene = Arc::new(Scene::load(&args.scene)?);
+    let scene = Scene::load(&args.scene)?;
     let camera = camera(&scene, None)?;
-    visibility::report(&PathTracer::new(scene)?, &camera, args.rays, out)
+    visibility::report(&scene, &camera, args.rays, out)
 }
 
 fn measure_threads(args: &ThreadsArgs, out: Out<'_>) -> Result<(), BenchError> {

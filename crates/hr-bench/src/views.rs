@@ -2,8 +2,9 @@
 
 use crate::compare::luminance;
 use crate::run::{camera, say};
-use crate::{BenchError, PathTracer, float_image, run::Out};
+use crate::{BenchError, float_image, run::Out};
 use hr_scene::{Camera, Image, Scene, ToneMap, builtin};
+use hr_view::path_tracer::{self, PathTracer};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -74,7 +75,8 @@ enum CameraOrName {
 /// # Errors
 /// Where the scene makes no sense or files cannot be read or written.
 pub fn path_traced(scene: Arc<Scene>, making: &Making<'_>, out: Out<'_>) -> Result<Subject, BenchError> {
-    let tracer = PathTracer::new(Arc::clone(&scene))?;
+    let visibility = path_tracer::visibility(&scene)?;
+    let tracer = PathTracer::new(&scene, &visibility);
     let mut cameras = scene.cameras.clone();
     if cameras.is_empty() {
         cameras.push(("default".into(), scene.default_camera()));

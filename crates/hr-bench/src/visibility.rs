@@ -3,14 +3,14 @@
 //! The measure is obvhs's own any-hit query on its own binary tree, over the same surfaces (quadrilaterals as two
 //! triangles).
 
-use crate::path_tracer::Sampler;
+use crate::BenchError;
 use crate::run::{Out, say};
-use crate::{BenchError, PathTracer};
 use glam::Vec3;
 use hr_diffuse::sampling::hash;
 use hr_diffuse::visibility::NO_BLOCKER;
-use hr_diffuse::{Domain, Geometry, Visibility};
-use hr_scene::Camera;
+use hr_diffuse::{Domain, Geometry, Normalization, Visibility};
+use hr_scene::{Camera, Scene};
+use hr_view::path_tracer::{self, Sampler};
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::Ray;
@@ -148,13 +148,13 @@ type Query<'a> = (String, Box<dyn Fn(&[Segment]) -> usize + 'a>);
 /// rays.
 ///
 /// # Errors
-/// [`BenchError::Output`] where nothing can be printed.
-pub fn report(tracer: &PathTracer, camera: &Camera, rays: u32, out: Out<'_>) -> Result<(), BenchError> {
-    let visibility = tracer.visibility();
+/// [`BenchError::Solve`] where a surface makes no sense, [`BenchError::Output`] where nothing can be printed.
+pub fn report(scene: &Scene, camera: &Camera, rays: u32, out: Out<'_>) -> Result<(), BenchError> {
+    let visibility = &path_tracer::visibility(scene)?;
     let areas = Areas::new(visibility);
     let surfaces = visibility.geometries();
     let curved = surfaces.iter().filter(|g| !g.is_flat()).count();
-    say(out, &format!("{}: {} surfaces, {curved} of them curved", tracer.scene().name, surfaces.len()))?;
+    say(out, &format!("{}: {} surfaces, {curved} of them curved", scene.name, surfaces.len()))?;
     say(out, "| segments | query | Mrays/s | times stock | blocked or hit |")?;
     say(out, "| --- | --- | ---: | ---: | ---: |")?;
     let stock = Stock::new(visibility);
@@ -183,7 +183,7 @@ pub fn report(tracer: &PathTracer, camera: &Camera, rays: u32, out: Out<'_>) -> 
             row(name, query, segments.len(), blocked, [seconds, best[0].0], out)?;
         }
     }
-    let eye = tracer.to_unit(camera.eye.into());
+    let eye = Normalization::new(&scene.surfaces).to_unit(camera.eye.into());
     let pixels = (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| (f64::from(x), f64::from(y))));
     let directions: Vec<Vec3> = pixels.map(|(x, y)| camera.direction(x + 0.5, y + 0.5).as_vec3()).collect();
     let start = Instant::now();

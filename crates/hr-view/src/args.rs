@@ -2,9 +2,8 @@
 
 use crate::ViewError;
 use crate::glossy::Mode;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::Parser;
 use clap::error::ErrorKind;
-use clap::{Parser, ValueEnum};
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -35,7 +34,7 @@ pub struct Args {
     pub frames: Option<PathBuf>,
 
     /// How glossy light is shown
-    #[arg(long, value_name = "M", value_enum, value_parser = mode(), default_value_t)]
+    #[arg(long, value_name = "M", value_enum, default_value_t)]
     pub mode: Mode,
 
     /// The accuracy asked for: relative error of the solution, 0.001 to 1
@@ -96,6 +95,9 @@ impl Args {
         if args.html.is_some() && args.mode != Mode::Distributions {
             return Err(ViewError::Arguments("--html shows distributions; leave --mode out".into()));
         }
+        if args.mode == Mode::Gather && args.image.is_none() && args.frames.is_none() {
+            return Err(ViewError::Arguments("--mode gather is for stills; add --image or --frames".into()));
+        }
         Ok(Parsed::Run(Box::new(args)))
     }
 }
@@ -109,14 +111,6 @@ fn one_line(error: &clap::Error) -> String {
     // A list of what is missing follows a colon, tips and possible values follow what they are about.
     let joined = kept.join("; ").replace(":; ", ": ");
     format!("{joined}; hr-view --help lists the options")
-}
-
-/// Takes a [`Mode`], and tells that there is to be another one.
-fn mode() -> impl TypedValueParser<Value = Mode> {
-    let gather = PossibleValue::new("gather").help("final gather at each pixel, for stills (not available yet)");
-    let modes = Mode::value_variants().iter().filter_map(ValueEnum::to_possible_value);
-    PossibleValuesParser::new(modes.chain([gather]))
-        .try_map(|name| Mode::from_str(&name, false).map_err(|_| "not available yet; use samples or distributions"))
 }
 
 fn error(text: &str) -> Result<f32, String> {
@@ -173,6 +167,7 @@ mod tests {
         assert_eq!(all.mode, Mode::Samples, "mode");
         assert_eq!((all.error, all.time_budget, all.threads), (0.02, Some(10.0), Some(3)), "numbers");
         assert_eq!(all.stats, Some("s.json".into()), "stats");
+        assert_eq!(run("--mode gather --image o.exr").mode, Mode::Gather, "stills by a final gather");
         assert_eq!(run("--frames out").frames, Some("out".into()), "frames");
     }
 
@@ -192,7 +187,7 @@ mod tests {
             ("--image", "--image"),
             ("--image a.png --frames b", "--frames"),
             ("a.mgf b.mgf", "b.mgf"),
-            ("--mode gather", "not available yet"),
+            ("--mode gather", "add --image"),
             ("--save x", "not available yet"),
             ("--load x", "not available yet"),
             ("--html x --mode samples", "leave --mode out"),

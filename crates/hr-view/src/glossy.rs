@@ -18,6 +18,8 @@ pub enum Mode {
     Distributions,
     /// reflect the incident samples at each pixel, in the window at each vertex (section 3.4)
     Samples,
+    /// final gather: one bounce of rays reads the solution, light of emitters comes by shadow rays; for stills
+    Gather,
 }
 
 /// Radiance (W/(m² sr)) from a leaf's distribution at a place of the leaf with the unit normal given, in the unit

@@ -8,6 +8,7 @@ pub mod facets;
 pub mod glossy;
 pub mod html;
 pub mod interrupt;
+pub mod path_tracer;
 pub mod progress;
 pub mod raycast;
 pub mod solved;

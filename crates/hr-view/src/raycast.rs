@@ -1,15 +1,17 @@
 //! The CPU ray caster: an image of a solution without a GPU.
 //!
 //! Every pixel sends a few rays; where one meets a surface, the diffuse light comes from the irradiance at the
-//! vertices, and the glossy part as the [`Mode`] says.
+//! vertices, and the glossy part as the [`Mode`] says. A final gather does that only one reflection later: the paths of
+//! a [path tracer](crate::path_tracer) end where they meet the solution, whose elements and mistakes are then seen blurred.
 
 use crate::glossy::{self, Mode};
+use crate::path_tracer::{PathTracer, Ray};
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::{GlossyField, Incident, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2, unit};
 use hr_diffuse::{Hit, NodeId, Rgb, Solution};
-use hr_scene::{Camera, Image, Scene};
+use hr_scene::{Camera, Image, Material, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
@@ -23,6 +25,10 @@ const LOBE_RAYS: u32 = 6;
 const NARROWEST: f32 = 0.03;
 /// Mirrors in mirrors end here.
 const MOST_BOUNCES: u32 = 4;
+/// Paths of a final gather, for every ray of the other modes. With the grid of stills 63 per pixel, 4032 per 8 × 8 block.
+const GATHERED: u32 = 7;
+/// A path ends where a ray stands for at least this share of the leaf that it meets; else one would see the elements.
+const WIDE: f32 = 1.0;
 /// Rays start this far from their surface (unit space): what rounding needs.
 const START: f32 = 1e-6;
 
@@ -34,6 +40,8 @@ pub struct RayCaster<'a> {
     mode: Mode,
     /// Rays per pixel are this squared.
     grid: u32,
+    /// Of a final gather.
+    tracer: Option<PathTracer<'a>>,
 }
 
 /// A point that a ray met.
@@ -51,10 +59,11 @@ impl<'a> RayCaster<'a> {
     /// For a scene and its solution.
     #[must_use]
     pub fn new(scene: &'a Scene, solution: &'a Solution<GlossyField>, mode: Mode) -> Self {
-        Self { scene, solution, mode, grid: 3 }
+        let tracer = (mode == Mode::Gather).then(|| PathTracer::new(scene, &solution.scene.visibility));
+        Self { scene, solution, mode, grid: 3, tracer }
     }
 
-    /// Rays per pixel, squared: 1…16. 3 by default.
+    /// Rays per pixel, squared: 1…16. 3 by default. A final gather has more of them in proportion.
     #[must_use]
     pub fn with_grid(self, grid: u32) -> Self {
         Self { grid: grid.clamp(1, 16), ..self }
@@ -63,6 +72,9 @@ impl<'a> RayCaster<'a> {
     /// The image that a camera takes: linear radiance, W/(m² sr). `watch` is told the share that is done.
     #[must_use]
     pub fn render(&self, camera: &Camera, watch: &(dyn Fn(f32) + Sync)) -> Image {
+        if let Some(tracer) = &self.tracer {
+            return tracer.render_until(&|ray| self.end(ray), camera, self.grid * self.grid * GATHERED, 0, watch).image;
+        }
         let mut image = Image::new(camera.width, camera.height);
         let width = camera.width as usize;
         let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
@@ -99,10 +111,38 @@ impl<'a> RayCaster<'a> {
     ) -> Rgb {
         let visibility = &self.solution.scene.visibility;
         let Some(hit) = visibility.closest_except(origin, direction, START, f32::MAX, own) else { return Rgb::ZERO };
-        let material_index = self.solution.scene.surface_materials[hit.surface as usize];
-        let material = &self.scene.materials[material_index as usize];
-        let emitted = if hit.front { material.exitance * FRAC_1_PI } else { Rgb::ZERO };
+        let emitted = if hit.front { self.material(&hit).exitance * FRAC_1_PI } else { Rgb::ZERO };
         let Some(leaf) = self.solution.leaf(&hit) else { return emitted };
+        emitted + self.leaving(hit, leaf, direction, bounce, seed, scratch)
+    }
+
+    /// Where a path of a final gather ends, and what is reflected there. Mirrors are followed, and so are rays from too
+    /// near or in too narrow a lobe, as long as there are not too many.
+    fn end(&self, ray: &Ray<'_>) -> Option<Rgb> {
+        let Some(leaf) = self.solution.leaf(ray.hit) else { return Some(Rgb::ZERO) };
+        let follows = ray.footprint() < WIDE * self.solution.elements.nodes[leaf.index()].area
+            || self.material(ray.hit).reflector.mirror() != Rgb::ZERO;
+        if follows && ray.bounce < MOST_BOUNCES {
+            return None;
+        }
+        Some(self.leaving(*ray.hit, leaf, ray.direction, ray.bounce.max(1), 0, &mut Vec::new()))
+    }
+
+    fn material(&self, hit: &Hit) -> &'a Material {
+        &self.scene.materials[self.scene.surfaces[hit.surface as usize].material as usize]
+    }
+
+    /// Radiance that a leaf reflects where it was hit, back against `direction`.
+    fn leaving(
+        &self,
+        hit: Hit,
+        leaf: NodeId,
+        direction: Vec3,
+        bounce: u32,
+        seed: u32,
+        scratch: &mut Vec<Incident>,
+    ) -> Rgb {
+        let material = self.material(&hit);
         let element = &self.solution.elements.nodes[leaf.index()];
         let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
         let base_color = self.scene.base_color(hit.surface, hit.uv.x, hit.uv.y);
@@ -112,7 +152,7 @@ impl<'a> RayCaster<'a> {
         let irradiance = self.solution.irradiance(leaf, hit.uv);
         let diffuse = reflector.diffuse() * irradiance * FRAC_1_PI;
         if reflector.is_diffuse() {
-            return emitted + diffuse;
+            return diffuse;
         }
         let away = -direction.normalize();
         let shading = self.solution.scene.shading_normal(hit.surface, hit.uv) * side;
@@ -120,23 +160,20 @@ impl<'a> RayCaster<'a> {
         let facing = shading.dot(away);
         let normal = if facing > 0.02 { shading } else { (shading + away * (0.02 - facing)).normalize() };
         let met = Met { hit, leaf, normal, away, reflector };
+        let faint = self.solution.faint[element.material as usize];
+        let mirrors = met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES;
         let glossy = match self.mode {
             Mode::Distributions => self.interpolated(&met),
-            Mode::Samples if bounce == 0 => self.reflected(&met, bounce, seed, scratch),
-            Mode::Samples if met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES => {
-                self.reflected(&met, bounce, seed, scratch)
-            }
-            Mode::Samples if self.solution.faint[material_index as usize] != Rgb::ZERO => {
-                self.solution.faint[material_index as usize] * irradiance * FRAC_1_PI
-            }
+            Mode::Samples if bounce == 0 || mirrors => self.reflected(&met, bounce, seed, scratch),
+            Mode::Samples | Mode::Gather if faint != Rgb::ZERO => faint * irradiance * FRAC_1_PI,
             // Of leaves whose light no link asked for there is no distribution.
-            Mode::Samples if self.solution.reflected[leaf.index()].is_empty() => {
+            Mode::Samples | Mode::Gather if self.solution.reflected[leaf.index()].is_empty() => {
                 let place = Place::along(met.hit.point, met.normal, met.reflector.grain());
                 glossy::reflected(self.solution, &*met.reflector, leaf, &place, away, NARROWEST, scratch)
             }
-            Mode::Samples => self.interpolated(&met),
+            Mode::Samples | Mode::Gather => self.interpolated(&met),
         };
-        emitted + (diffuse + glossy).max(Rgb::ZERO)
+        (diffuse + glossy).max(Rgb::ZERO)
     }
 
     /// Glossy radiance from the distributions around the point.

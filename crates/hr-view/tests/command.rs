@@ -27,7 +27,7 @@ fn mistakes_are_status_1_and_one_line() {
         (&["--image", "picture.gif"], ".png"),
         (&["--error", "2"], "0.001"),
         (&["furnace", "--html", "no/such/folder/a.html"], "no/such/folder/a.html"),
-        (&["--mode", "gather", "--image", "a.png"], "not available yet"),
+        (&["--mode", "gather"], "add --image"),
         (&["furnace", "--image", "no/such/folder/a.png"], "no/such/folder/a.png"),
         (&["furnace", "--error", "0.9", "--frames", "/dev/null/frames"], "/dev/null/frames"),
     ];
@@ -108,7 +108,7 @@ fn pictures_have_the_cameras_size_and_the_right_light() {
     // Radiosity is exitance / (1 − reflectance) in a closed furnace.
     let expected =
         material.exitance / (hr_scene::Rgb::ONE - material.reflector.diffuse()) * std::f32::consts::FRAC_1_PI;
-    for mode in ["distributions", "samples"] {
+    for mode in ["distributions", "samples", "gather"] {
         let pfm = folder.path(&format!("{mode}.pfm"));
         succeeds(&["furnace", "--error", "0.2", "--camera", &camera, "--mode", mode, "--image", &pfm]);
         let (width, height, channels) = read_pfm(&pfm);

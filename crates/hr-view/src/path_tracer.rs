@@ -1,5 +1,6 @@
-//! A reference path tracer, to measure solutions by: unbiased, on the exact surfaces, and with nothing of hierarchical
-//! radiosity in it but its rays and its reflectors.
+//! A path tracer on the exact surfaces, with nothing of hierarchical radiosity in it but its rays and its reflectors.
+//! Its paths go on until their light is gone, as references need it: such images are unbiased. Or they end where somebody
+//! knows the light already, which makes of a solution a final gather ([`RayCaster`](crate::raycast::RayCaster)).
 //!
 //! At every point of a path one emitter is picked for direct light, and one part of the BRDF (its Lambertian share, its
 //! glossy part or its mirror) for the path to go on. Emitters that both find are weighted by the power heuristic
@@ -18,12 +19,11 @@ mod tests;
 pub use emitters::{Arrival, Emitters};
 pub use sampler::Sampler;
 
-use crate::BenchError;
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::{Place, Reflector};
 use hr_diffuse::sampling::hash;
 use hr_diffuse::visibility::NO_BLOCKER;
-use hr_diffuse::{Geometry, Hit, Normalization, Rgb, Visibility};
+use hr_diffuse::{Geometry, Hit, Normalization, Rgb, SolveError, Visibility};
 use hr_scene::{Camera, Image, Scene};
 use rayon::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -48,14 +48,17 @@ const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
 /// Side of the grid of rays that look for emitters in a pixel.
 const LOOKS: u32 = 4;
 
+/// Footprints of rays are not enlarged by less cosine than this.
+const LEAST_COSINE: f32 = 1e-3;
+
 /// Pairs of random numbers that one bounce uses, after the pixel's own.
 const PAIRS: u32 = 4;
 
 /// Path traces a scene.
 #[derive(Debug)]
-pub struct PathTracer {
-    scene: Arc<Scene>,
-    visibility: Visibility,
+pub struct PathTracer<'a> {
+    scene: &'a Scene,
+    visibility: &'a Visibility,
     normalization: Normalization,
     emitters: Emitters,
     /// Largest channel of each material's glossy albedo, 0 where it is diffuse.
@@ -71,6 +74,32 @@ pub struct Reference {
     /// true error is this or less.
     pub sigma: Image,
 }
+
+/// A ray of a path that met a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray<'a> {
+    /// What it met.
+    pub hit: &'a Hit,
+    /// Its unit direction.
+    pub direction: Vec3,
+    /// What stands for the density per solid angle that it was drawn with; infinite from the eye and from mirrors.
+    pub density: f32,
+    /// Reflections before: 0 for a ray from the eye.
+    pub bounce: u32,
+}
+
+impl Ray<'_> {
+    /// Area (unit space) that the ray stands for where it met the surface; 0 for one from the eye or a mirror.
+    #[must_use]
+    pub fn footprint(&self) -> f32 {
+        let cosine = self.hit.normal.dot(self.direction).abs().max(LEAST_COSINE);
+        self.hit.t * self.hit.t / (self.density * cosine)
+    }
+}
+
+/// Where paths end: told what a ray met, it gives the radiance that is reflected there back along the ray (W/(m² sr),
+/// without what is emitted), or nothing where the path is to go on.
+pub type End<'a> = dyn Fn(&Ray<'_>) -> Option<Rgb> + Sync + 'a;
 
 /// A point that reflects.
 struct Point {
@@ -98,57 +127,58 @@ struct Step {
     density: f32,
 }
 
-impl PathTracer {
-    /// Prepares a scene.
-    ///
-    /// # Errors
-    /// [`BenchError::Surface`] where a surface makes no sense.
-    pub fn new(scene: Arc<Scene>) -> Result<Self, BenchError> {
+/// The rays of a scene.
+///
+/// # Errors
+/// [`SolveError::Surface`] where a surface makes no sense.
+pub fn visibility(scene: &Scene) -> Result<Visibility, SolveError> {
+    let normalization = Normalization::new(&scene.surfaces);
+    let geometries = scene
+        .surfaces
+        .iter()
+        .enumerate()
+        .map(|(surface, s)| {
+            Geometry::from_surface(s, &normalization).map_err(|source| SolveError::Surface { surface, source })
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(Visibility::new(&geometries))
+}
+
+impl<'a> PathTracer<'a> {
+    /// Prepares a scene; `visibility` is that of its surfaces, as [`visibility`] or a solution has it.
+    #[must_use]
+    pub fn new(scene: &'a Scene, visibility: &'a Visibility) -> Self {
         let normalization = Normalization::new(&scene.surfaces);
-        let geometries = scene
-            .surfaces
-            .iter()
-            .enumerate()
-            .map(|(surface, s)| {
-                Geometry::from_surface(s, &normalization).map_err(|source| BenchError::Surface { surface, source })
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        let emitters = Emitters::new(&scene, &geometries, &normalization, CANDIDATES);
+        let emitters = Emitters::new(scene, visibility.geometries(), &normalization, CANDIDATES);
         let albedo = |reflector: &Arc<dyn Reflector>| {
             if reflector.is_diffuse() { 0.0 } else { reflector.glossy_albedo().max_element().max(LEAST_ALBEDO) }
         };
         let albedos = scene.materials.iter().map(|m| albedo(&m.reflector)).collect();
-        let visibility = Visibility::new(&geometries);
-        Ok(Self { scene, visibility, normalization, emitters, albedos })
-    }
-
-    /// The scene.
-    #[must_use]
-    pub fn scene(&self) -> &Arc<Scene> {
-        &self.scene
-    }
-
-    /// The rays.
-    #[must_use]
-    pub fn visibility(&self) -> &Visibility {
-        &self.visibility
-    }
-
-    /// A position in unit space, where [`visibility`](Self::visibility) is.
-    #[must_use]
-    pub fn to_unit(&self, position: DVec3) -> Vec3 {
-        self.normalization.to_unit(position)
+        Self { scene, visibility, normalization, emitters, albedos }
     }
 
     /// The image that a camera takes with `paths` paths per pixel (at least one). The same seed gives the same image,
     /// for any number of threads; others give independent ones. `watch` is told the share that is done.
     #[must_use]
     pub fn render(&self, camera: &Camera, paths: u32, seed: u32, watch: &(dyn Fn(f32) + Sync)) -> Reference {
+        self.render_until(&|_| None, camera, paths, seed, watch)
+    }
+
+    /// [`render`](Self::render) by paths that [end](End).
+    #[must_use]
+    pub fn render_until(
+        &self,
+        end: &End<'_>,
+        camera: &Camera,
+        paths: u32,
+        seed: u32,
+        watch: &(dyn Fn(f32) + Sync),
+    ) -> Reference {
         let paths = paths.max(1);
         let mut image = Image::new(camera.width, camera.height);
         let mut sigma = image.clone();
         let width = camera.width as usize;
-        let eye = self.to_unit(camera.eye.into());
+        let eye = self.normalization.to_unit(camera.eye.into());
         let view = View::new(camera);
         let done = AtomicU32::new(0);
         let rows = image.pixels.par_chunks_mut(width).zip(sigma.pixels.par_chunks_mut(width));
@@ -159,7 +189,7 @@ impl PathTracer {
                 for index in 0..paths {
                     let sampler = Sampler::new(seed, index);
                     let direction = view.direction(Vec2::new(x as f32, y as f32), sampler.pair(0));
-                    let radiance = self.path(eye, direction, &sampler).as_dvec3();
+                    let radiance = self.path(eye, direction, &sampler, end).as_dvec3();
                     sum += radiance;
                     squares += radiance * radiance;
                 }
@@ -178,7 +208,7 @@ impl PathTracer {
     #[must_use]
     pub fn emission(&self, camera: &Camera) -> Image {
         let mut image = Image::new(camera.width, camera.height);
-        let eye = self.to_unit(camera.eye.into());
+        let eye = self.normalization.to_unit(camera.eye.into());
         let view = View::new(camera);
         image.pixels.par_chunks_mut(camera.width as usize).enumerate().for_each(|(y, row)| {
             for (x, pixel) in row.iter_mut().enumerate() {
@@ -196,7 +226,7 @@ impl PathTracer {
 
     /// Radiance that arrives at `origin` (unit space) against the unit `direction`, by one path.
     #[must_use]
-    pub fn path(&self, mut origin: Vec3, mut direction: Vec3, sampler: &Sampler) -> Rgb {
+    pub fn path(&self, mut origin: Vec3, mut direction: Vec3, sampler: &Sampler, end: &End<'_>) -> Rgb {
         let (mut light, mut throughput) = (Rgb::ZERO, Rgb::ONE);
         let (mut own, mut density) = (NO_BLOCKER, f32::INFINITY);
         for bounce in 0.. {
@@ -205,6 +235,10 @@ impl PathTracer {
             if emitted != Rgb::ZERO {
                 let other = self.emitters.density(hit.surface, hit.t, -hit.normal.dot(direction));
                 light += throughput * emitted * power_heuristic(density, other);
+            }
+            if let Some(reflected) = end(&Ray { hit: &hit, direction, density, bounce }) {
+                light += throughput * reflected;
+                break;
             }
             let Some(point) = self.point(&hit, direction) else { break };
             let pair = |i: u32| sampler.pair(1 + bounce * PAIRS + i);
@@ -358,7 +392,8 @@ impl Point {
 
 /// Weight of a sample of density `own` where `other` is that of another way to draw it (exponent 2). The weights of
 /// both add up to 1; an infinite density takes all.
-pub(crate) fn power_heuristic(own: f32, other: f32) -> f32 {
+#[must_use]
+pub fn power_heuristic(own: f32, other: f32) -> f32 {
     if own.is_infinite() {
         return 1.0;
     }
@@ -367,7 +402,8 @@ pub(crate) fn power_heuristic(own: f32, other: f32) -> f32 {
 }
 
 /// A direction of density cos/π (Malley's method).
-pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3 {
+#[must_use]
+pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
     let (sin, cos) = (2.0 * PI * u.x).sin_cos();
     let radius = u.y.sqrt();
     Vec3::new(radius * cos, radius * sin, (1.0 - u.y).sqrt())

@@ -32,12 +32,13 @@ fn scene(surfaces: Vec<Surface>, materials: Vec<Material>) -> Scene {
 
 /// Mean radiance at `at` toward the eye at `eye` (scene units), and its standard error.
 fn seen(scene: Scene, eye: DVec3, at: DVec3, paths: u32) -> (f64, f64) {
-    let tracer = PathTracer::new(Arc::new(scene)).expect("sound surfaces");
-    let (origin, target) = (tracer.to_unit(eye), tracer.to_unit(at));
+    let rays = visibility(&scene).expect("sound surfaces");
+    let tracer = PathTracer::new(&scene, &rays);
+    let (origin, target) = (tracer.normalization.to_unit(eye), tracer.normalization.to_unit(at));
     let direction = (target - origin).normalize();
     let (mut sum, mut squares) = (0.0, 0.0);
     for index in 0..paths {
-        let value = f64::from(tracer.path(origin, direction, &Sampler::new(17, index)).x);
+        let value = f64::from(tracer.path(origin, direction, &Sampler::new(17, index), &|_| None).x);
         sum += value;
         squares += value * value;
     }
@@ -63,10 +64,11 @@ fn parallel_square(half: f64, height: f64) -> f64 {
 #[test]
 fn furnace_has_the_same_radiance_everywhere() {
     // In a closed cube that emits e and reflects r, radiosity is e/(1 − r) everywhere.
-    let scene = Arc::new(Scene::load("furnace").expect("built in"));
+    let scene = Scene::load("furnace").expect("built in");
     let camera = scene.cameras[0].1;
     let camera = Camera { width: 24, height: 18, ..camera };
-    let tracer = PathTracer::new(scene).expect("sound");
+    let rays = visibility(&scene).expect("sound");
+    let tracer = PathTracer::new(&scene, &rays);
     let found = tracer.render(&camera, 256, 0, &|_| ());
     let expected = Rgb::new(1.25, 4.0, 15.0) * FRAC_1_PI;
     let mean = found.image.pixels.iter().sum::<Rgb>() / found.image.pixels.len() as f32;
@@ -192,9 +194,10 @@ fn energy_is_kept_between_two_spheres() {
 
 #[test]
 fn the_same_seed_gives_the_same_image() {
-    let scene = Arc::new(Scene::load("glossy-sphere").expect("built in"));
+    let scene = Scene::load("glossy-sphere").expect("built in");
     let camera = Camera { width: 20, height: 15, ..scene.cameras[0].1 };
-    let tracer = PathTracer::new(scene).expect("sound");
+    let rays = visibility(&scene).expect("sound");
+    let tracer = PathTracer::new(&scene, &rays);
     let render = |threads: usize, seed| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| tracer.render(&camera, 4, seed, &|_| ()))
@@ -202,16 +205,17 @@ fn the_same_seed_gives_the_same_image() {
     let one = render(1, 5);
     assert_eq!(one, render(3, 5), "for any number of threads");
     assert_ne!(one.image, render(1, 6).image, "another seed is another image");
-    let path = std::env::temp_dir().join(format!("hr-bench-sigma-{}.pfm", std::process::id()));
+    let path = std::env::temp_dir().join(format!("hr-view-sigma-{}.pfm", std::process::id()));
     one.sigma.save(&path, &ToneMap::default(), Primaries::Radiance).expect("saved");
     std::fs::remove_file(&path).expect("it was written");
 }
 
 #[test]
 fn emitters_are_seen_without_what_they_reflect() {
-    let scene = Arc::new(Scene::load("furnace").expect("built in"));
+    let scene = Scene::load("furnace").expect("built in");
     let camera = Camera { width: 8, height: 6, ..scene.cameras[0].1 };
-    let tracer = PathTracer::new(scene).expect("sound");
+    let rays = visibility(&scene).expect("sound");
+    let tracer = PathTracer::new(&scene, &rays);
     let expected = Rgb::new(1.0, 2.0, 3.0) * FRAC_1_PI;
     for p in tracer.emission(&camera).pixels {
         assert!((p - expected).abs().max_element() < 1e-5, "{p}, expected {expected}");
