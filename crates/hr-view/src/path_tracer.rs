@@ -41,7 +41,7 @@ const MOST_SURVIVAL: f32 = 0.95;
 /// A glossy part is drawn with at least this albedo: that of a remainder may be 0 in the mean only.
 const LEAST_ALBEDO: f32 = 0.05;
 /// Emitters among which one is picked at each point of a path.
-const CANDIDATES: u32 = 16;
+const CANDIDATES: u32 = 4;
 /// Step from one candidate's place on its emitter to the next one's: the two-dimensional golden ratio, as in
 /// [`hr_diffuse::sampling`].
 const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);

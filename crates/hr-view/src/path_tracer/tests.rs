@@ -31,9 +31,9 @@ fn scene(surfaces: Vec<Surface>, materials: Vec<Material>) -> Scene {
 }
 
 /// Mean radiance at `at` toward the eye at `eye` (scene units), and its standard error.
-fn seen(scene: Scene, eye: DVec3, at: DVec3, paths: u32) -> (f64, f64) {
-    let rays = visibility(&scene).expect("sound surfaces");
-    let tracer = PathTracer::new(&scene, &rays);
+fn seen(scene: &Scene, eye: DVec3, at: DVec3, paths: u32) -> (f64, f64) {
+    let rays = visibility(scene).expect("sound surfaces");
+    let tracer = PathTracer::new(scene, &rays);
     let (origin, target) = (tracer.normalization.to_unit(eye), tracer.normalization.to_unit(at));
     let direction = (target - origin).normalize();
     let (mut sum, mut squares) = (0.0, 0.0);
@@ -91,11 +91,11 @@ fn direct_light_of_a_square_is_lamberts() {
     let lamp = || material(Lambert::BLACK, 10.0, true);
     let diffuse = scene(surfaces.clone(), vec![material(lambert(0.6), 0.0, true), lamp()]);
     let expected = 0.6 / std::f64::consts::PI * 10.0 * form_factor;
-    agrees(seen(diffuse, eye, at, 4096), expected, "diffuse ground");
+    agrees(seen(&diffuse, eye, at, 4096), expected, "diffuse ground");
     // A lamp that is turned away gives nothing.
     let away = vec![surfaces[0].clone(), square(half, height, false, 1)];
     let dark = scene(away, vec![material(lambert(0.6), 0.0, true), lamp()]);
-    assert_eq!(seen(dark, eye, at, 256), (0.0, 0.0), "the back of a lamp is dark");
+    assert_eq!(seen(&dark, eye, at, 256), (0.0, 0.0), "the back of a lamp is dark");
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn both_ways_to_find_light_agree_for_gloss() {
         }
         let surfaces = vec![square(1.0, 0.0, false, 0), square(half, height, true, 1)];
         let glossy = scene(surfaces, vec![material(ward, 0.0, true), material(Lambert::BLACK, 10.0, true)]);
-        agrees(seen(glossy, eye, at, 16384), expected, &format!("alpha {alpha}"));
+        agrees(seen(&glossy, eye, at, 16384), expected, &format!("alpha {alpha}"));
     }
 }
 
@@ -153,7 +153,7 @@ fn lights_without_extent_and_scale() {
     ] {
         let mut lit = ground(true);
         lit.lights = vec![light(kind)];
-        let (mean, _) = seen(lit, eye, shift, 16);
+        let (mean, _) = seen(&lit, eye, shift, 16);
         assert!((mean - reflected * expected).abs() <= 1e-4 * reflected * expected, "{what}: {mean}");
     }
     // From below: a two-sided sheet shades its other side, a one-sided back absorbs whatever comes.
@@ -161,7 +161,7 @@ fn lights_without_extent_and_scale() {
         let mut lit = ground(sides);
         lit.lights = vec![light(LightKind::Directional { direction: Vec3::new(0.6, 0.0, 0.8) })];
         let below = shift - dvec3(-50.0, 20.0, 60.0);
-        let (mean, _) = seen(lit, below, shift, 16);
+        let (mean, _) = seen(&lit, below, shift, 16);
         assert!((mean - expected).abs() <= 1e-4 * expected, "two-sided {sides}: {mean}, expected {expected}");
     }
 }
@@ -171,7 +171,7 @@ fn mirrors_show_the_lamp_and_lose_their_share() {
     let mirror = Ward::new(Rgb::ZERO, Rgb::splat(0.9), 0.0).expect("a mirror");
     let surfaces = vec![square(1.0, 0.0, false, 0), square(0.4, 0.7, true, 1)];
     let shown = scene(surfaces, vec![material(mirror, 0.0, true), material(Lambert::BLACK, 10.0, true)]);
-    agrees(seen(shown, dvec3(0.3, 0.1, 0.6), DVec3::ZERO, 4096), 0.9 * 10.0 / std::f64::consts::PI, "mirror");
+    agrees(seen(&shown, dvec3(0.3, 0.1, 0.6), DVec3::ZERO, 4096), 0.9 * 10.0 / std::f64::consts::PI, "mirror");
 }
 
 #[test]
@@ -189,7 +189,7 @@ fn energy_is_kept_between_two_spheres() {
     let irradiance = 5.0 * share / (1.0 - r * (1.0 - share));
     let expected = r * irradiance / std::f64::consts::PI;
     let middle = dvec3(1.0, 2.0, 3.0);
-    agrees(seen(both, middle + dvec3(0.5, 0.1, 0.0), middle + dvec3(0.6, 0.9, 0.1), 16384), expected, "wall");
+    agrees(seen(&both, middle + dvec3(0.5, 0.1, 0.0), middle + dvec3(0.6, 0.9, 0.1), 16384), expected, "wall");
 }
 
 #[test]
