@@ -10,6 +10,7 @@ pub mod html;
 pub mod interrupt;
 pub mod progress;
 pub mod raycast;
+pub mod solution_file;
 pub mod solved;
 pub mod stats;
 pub mod walkthrough;
