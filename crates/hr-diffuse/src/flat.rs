@@ -82,7 +82,15 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// Where there is less left than it says, or bytes are no `T`.
-    pub fn take<T: NoUninit + CheckedBitPattern>(&mut self, what: &'static str) -> Result<Vec<T>, FlatError> {
+    pub fn take<T: CheckedBitPattern + 'a>(&mut self, what: &'static str) -> Result<Vec<T>, FlatError> {
+        self.view(what).map(<[T]>::to_vec)
+    }
+
+    /// Looks at an array where it lies.
+    ///
+    /// # Errors
+    /// As [`take`](Self::take).
+    pub fn view<T: CheckedBitPattern>(&mut self, what: &'static str) -> Result<&'a [T], FlatError> {
         let ends = || FlatError::Ends(what);
         let (count, rest) = self.0.split_first_chunk().ok_or_else(ends)?;
         let count = usize::try_from(u64::from_ne_bytes(*count)).ok();
@@ -90,8 +98,7 @@ impl<'a> Reader<'a> {
         let padded = bytes.checked_next_multiple_of(ALIGN).ok_or_else(ends)?;
         let (array, rest) = rest.split_at_checked(padded).ok_or_else(ends)?;
         self.0 = rest;
-        let array = bytemuck::checked::try_cast_slice(&array[..bytes]).map_err(|_| FlatError::Misfit(what))?;
-        Ok(array.to_vec())
+        bytemuck::checked::try_cast_slice(&array[..bytes]).map_err(|_| FlatError::Misfit(what))
     }
 
     /// Reads an array of structures of `f32`, all of them finite.

@@ -134,6 +134,8 @@ mod tests {
     use crate::builtin;
     use std::sync::Arc;
 
+    type Change = fn(&mut Scene);
+
     fn room() -> Scene {
         Scene::load("room").expect("built in")
     }
@@ -150,8 +152,8 @@ mod tests {
 
     #[test]
     fn every_change_to_light_shows() {
-        let changes: [(&str, fn(&mut Scene)); 6] = [
-            ("a surface less", |scene| drop(scene.surfaces.pop())),
+        let changes: [(&str, Change); 6] = [
+            ("a surface less", |scene| scene.surfaces.truncate(scene.surfaces.len() - 1)),
             ("a surface turned over", |scene| scene.surfaces[3].flip ^= true),
             ("a surface of another material", |scene| scene.surfaces[0].material ^= 1),
             ("a brighter lamp", |scene| scene.materials[0].exitance.x += 1e-6),

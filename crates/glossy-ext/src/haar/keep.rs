@@ -3,6 +3,7 @@
 use super::half::Half3;
 use super::{Haar, MAX_LEVEL, Node};
 use hr_diffuse::flat::{FlatError, Reader, Writer, fits};
+use rayon::prelude::*;
 use std::io;
 
 const WHAT: &str = "directional distributions";
@@ -42,22 +43,19 @@ impl Haar {
     /// # Errors
     /// Where it is anything else.
     pub fn restore(from: &mut Reader<'_>) -> Result<Vec<Self>, FlatError> {
-        let heads: Vec<Head> = from.take(WHAT)?;
-        let (vertices, nodes): (Vec<Half3>, Vec<Node>) = (from.take(WHAT)?, from.take(WHAT)?);
-        let (mut vertices, mut nodes) = (&vertices[..], &nodes[..]);
-        let mut all = Vec::with_capacity(heads.len());
+        let heads: &[Head] = from.view(WHAT)?;
+        let (mut vertices, mut nodes): (&[Half3], &[Node]) = (from.view(WHAT)?, from.view(WHAT)?);
+        let mut parts = Vec::with_capacity(heads.len());
         for head in heads {
-            let haar = Self {
-                scale: head.scale,
-                roots: head.roots.try_into().map_err(|_| FlatError::Misfit(WHAT))?,
-                vertices: split_off(&mut vertices, head.vertices)?,
-                nodes: split_off(&mut nodes, head.nodes)?,
-            };
-            fits(haar.is_sound(), WHAT)?;
-            all.push(haar);
+            parts.push((head, split_off(&mut vertices, head.vertices)?, split_off(&mut nodes, head.nodes)?));
         }
         fits(vertices.is_empty() && nodes.is_empty(), WHAT)?;
-        Ok(all)
+        let restored = parts.into_par_iter().with_min_len(64).map(|(head, vertices, nodes)| {
+            let roots = head.roots.try_into().map_err(|_| FlatError::Misfit(WHAT))?;
+            let haar = Self { scale: head.scale, roots, vertices: vertices.into(), nodes: nodes.into() };
+            fits(haar.is_sound(), WHAT).map(|()| haar)
+        });
+        restored.collect()
     }
 
     /// Whether every index is within what it points into, and nodes are a forest no deeper than it may be.
@@ -90,8 +88,8 @@ impl Haar {
 }
 
 /// Takes so many entries off the front.
-fn split_off<T: Copy>(rest: &mut &[T], count: u32) -> Result<Box<[T]>, FlatError> {
+fn split_off<'a, T>(rest: &mut &'a [T], count: u32) -> Result<&'a [T], FlatError> {
     let (taken, after) = rest.split_at_checked(count as usize).ok_or(FlatError::Misfit(WHAT))?;
     *rest = after;
-    Ok(taken.into())
+    Ok(taken)
 }
