@@ -42,9 +42,8 @@ pub fn fits(holds: bool, what: &'static str) -> Result<(), FlatError> {
 }
 
 /// Whether all of an array of structures of `f32` are finite.
-#[must_use]
-pub fn is_finite<T: Pod>(array: &[T]) -> bool {
-    bytemuck::cast_slice::<T, f32>(array).iter().all(|x| x.is_finite())
+pub(crate) fn is_finite<T: Pod>(array: &[T]) -> bool {
+    bytemuck::try_cast_slice::<T, f32>(array).is_ok_and(|numbers| numbers.iter().all(|x| x.is_finite()))
 }
 
 /// Writes arrays.
@@ -134,4 +133,47 @@ pub(crate) fn are_offsets(offsets: &[u32], groups: usize, length: usize) -> bool
         && offsets.first() == Some(&0)
         && offsets.last().is_some_and(|&last| last as usize == length)
         && offsets.is_sorted()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(fill: impl FnOnce(&mut Writer<'_>) -> io::Result<()>) -> Vec<u64> {
+        let mut bytes = Vec::new();
+        fill(&mut Writer::new(&mut bytes)).expect("memory takes everything");
+        bytemuck::pod_collect_to_vec(&bytes)
+    }
+
+    #[test]
+    fn arrays_of_any_size_come_back() {
+        for length in 0..20_u8 {
+            let bytes: Vec<u8> = (0..length).collect();
+            let flags: Vec<bool> = bytes.iter().map(|b| b % 3 == 0).collect();
+            let words = written(|out| {
+                out.put(&bytes)?;
+                out.put(&flags)?;
+                out.put(&[0.5_f64])
+            });
+            let mut reader = Reader::new(&words);
+            assert_eq!(reader.take::<u8>("bytes").as_ref(), Ok(&bytes), "{length} bytes");
+            assert_eq!(reader.take::<bool>("flags"), Ok(flags), "{length} flags");
+            assert_eq!(reader.end(), Err(FlatError::GoesOn), "there is one more");
+            assert_eq!(reader.take_exactly("number"), Ok([0.5_f64]), "the number after them");
+            assert_eq!(reader.end(), Ok(()), "that was all");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        let words = written(|out| out.put(&[1_u8, 2, 3]));
+        assert_eq!(Reader::new(&words).take::<bool>("flags"), Err(FlatError::Misfit("flags")), "2 is no flag");
+        assert_eq!(Reader::new(&words).take_exactly::<u8, 2>("pair"), Err(FlatError::Misfit("pair")), "three");
+        assert_eq!(Reader::new(&words).take_finite::<u8>("bytes"), Err(FlatError::Misfit("bytes")), "no f32");
+        let words = written(|out| out.put(&[1.0, f32::NAN]));
+        assert_eq!(Reader::new(&words).take_finite::<f32>("light"), Err(FlatError::Misfit("light")), "no number");
+        for words in [&words[..1], &[], &[u64::MAX, 0], &[u64::MAX / 4, 0], &[1 << 61, 0]] {
+            assert_eq!(Reader::new(words).take::<f32>("light"), Err(FlatError::Ends("light")), "{words:?}");
+        }
+    }
 }

@@ -297,7 +297,15 @@ impl Stats {
             skipped,
             seconds: _,
         } = *self;
-        let Skipped { black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves } = skipped;
+        let Skipped {
+            black_receivers,
+            unlit_senders,
+            facing,
+            proved_free,
+            sealed_sides,
+            converged_leaves,
+            faint_links,
+        } = skipped;
         let spent = match spent {
             None => 0_u64,
             Some(Spent::Time) => 1,
@@ -305,7 +313,7 @@ impl Stats {
         };
         out.put(&[polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations.into(), bytes])?;
         out.put(&[stopped.into(), spent])?;
-        out.put(&[black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves])?;
+        out.put(&[black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves, faint_links])?;
         out.put(residuals)
     }
 
@@ -313,7 +321,7 @@ impl Stats {
         const WHAT: &str = "statistics";
         let [polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations, bytes] = from.take_exactly(WHAT)?;
         let [stopped, spent] = from.take_exactly::<u64, 2>(WHAT)?;
-        let [black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves] =
+        let [black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves, faint_links] =
             from.take_exactly(WHAT)?;
         Ok(Self {
             polygons,
@@ -333,7 +341,15 @@ impl Stats {
                 _ => return Err(FlatError::Misfit(WHAT)),
             },
             bytes,
-            skipped: Skipped { black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves },
+            skipped: Skipped {
+                black_receivers,
+                unlit_senders,
+                facing,
+                proved_free,
+                sealed_sides,
+                converged_leaves,
+                faint_links,
+            },
             seconds: Seconds::default(),
         })
     }

@@ -229,8 +229,9 @@ fn kept_solutions_give_the_same_pictures() {
     let folder = Folder::new("kept");
     let paths = ["camera.json", "a.light", "solved.pfm", "loaded.pfm", "solved.json", "loaded.json"];
     let [camera, light, solved, loaded, solved_stats, loaded_stats] = paths.map(|name| folder.path(name));
-    let view = r#"{"eye":[0.5,-2.5,1.2],"target":[0,0,0.5],"up":[0,0,1],"fov_x":50,"width":20,"height":12}"#;
-    folder.write("camera.json", view);
+    let mut view = hr_scene::Scene::load("room").expect("built in").default_camera();
+    [view.width, view.height] = [20, 12];
+    folder.write("camera.json", &serde_json::to_string(&view).expect("a camera is JSON"));
     let picture = ["--camera", &camera, "--image"];
     for mode in ["samples", "distributions"] {
         let show = ["room", "--mode", mode, "--threads", "2"];

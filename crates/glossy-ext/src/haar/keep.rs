@@ -75,14 +75,16 @@ impl Haar {
             let level = levels[index];
             let mids = node.mids();
             let are_vertices = mids.iter().all(|&m| m == Node::NO_VERTEX || usize::from(m) < self.vertices.len());
-            let follow = (0..4).filter_map(|child| node.child(child)).all(|child| {
-                let is_new = child > index && levels.get(child) == Some(&UNMET);
-                if is_new {
-                    levels[child] = level + 1;
-                }
-                is_new
-            });
-            level <= MAX_LEVEL && are_vertices && follow && (node.is_divided() || node.is_childless())
+            let mut follow = || {
+                (0..4).filter_map(|child| node.child(child)).all(|child| {
+                    let is_new = child > index && levels.get(child) == Some(&UNMET);
+                    if is_new {
+                        levels[child] = level + 1;
+                    }
+                    is_new
+                })
+            };
+            level <= MAX_LEVEL && are_vertices && (node.is_childless() || node.is_divided() && follow())
         })
     }
 }
