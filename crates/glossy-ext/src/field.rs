@@ -53,6 +53,18 @@ pub struct Counters {
 }
 
 impl Counters {
+    /// All of them, to be kept.
+    pub(crate) fn counts(&self) -> [u64; 3] {
+        [&self.evaluations, &self.samples, &self.clamped].map(|counter| counter.load(Ordering::Relaxed))
+    }
+
+    /// Takes over those of a solution that was kept.
+    pub(crate) fn take_over(&self, [evaluations, samples, clamped]: [u64; 3]) {
+        self.evaluations.store(evaluations, Ordering::Relaxed);
+        self.samples.store(samples, Ordering::Relaxed);
+        self.clamped.store(clamped, Ordering::Relaxed);
+    }
+
     /// BRDF evaluations so far: one per sample and direction.
     #[must_use]
     pub fn brdf_evaluations(&self) -> u64 {

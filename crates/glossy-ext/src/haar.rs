@@ -37,6 +37,7 @@
 
 mod combine;
 mod half;
+mod keep;
 mod mesh;
 mod outline;
 mod project;

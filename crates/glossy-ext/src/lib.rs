@@ -5,6 +5,7 @@
 pub mod conformance;
 pub mod field;
 pub mod haar;
+mod keep;
 pub mod reflector;
 pub mod samples;
 

@@ -5,7 +5,8 @@ use glam::Vec3;
 /// A set of directions: all unit vectors within an angle of an axis.
 ///
 /// `cos_angle` is in −1…1; −1 is the whole sphere.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub struct Cone {
     /// Unit axis.
     pub axis: Vec3,

@@ -4,7 +4,8 @@ use glam::{Vec3, Vec3Swizzles};
 
 /// Area-weighted first and second moments of unit normals. Linear: those of a whole are the mean of those of its
 /// parts, so that splitting an element changes nothing in sum.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub struct Facing {
     /// Mean normal: of length 1 for flat sets, 0 for closed ones.
     pub mean: Vec3,

@@ -25,7 +25,8 @@ use std::sync::Arc;
 const FAN_OUT: usize = 4;
 
 /// What a node stands for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::NoUninit, bytemuck::CheckedBitPattern)]
+#[repr(u8)]
 pub enum Kind {
     /// Several surfaces.
     Cluster,
@@ -38,10 +39,17 @@ pub enum Kind {
 }
 
 /// One node: its geometry in unit space, and its place in the tree.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::NoUninit, bytemuck::CheckedBitPattern)]
+#[repr(C)]
 pub struct Element {
     /// What it stands for.
     pub kind: Kind,
+    /// Whether an extension takes part here or below.
+    pub active: bool,
+    /// Whether it is a whole sphere seen from outside.
+    pub whole_sphere: bool,
+    /// Whether no two points of the node's side of its surface see each other.
+    pub convex: bool,
     /// Corners of a box that holds it.
     pub bounds: [Vec3; 2],
     /// Middle (on the surface, for parts of one).
@@ -71,14 +79,8 @@ pub struct Element {
     /// Largest channel of what the node can reflect or what an extension makes of it; 0: light that arrives here
     /// is of no consequence.
     pub importance: f32,
-    /// Whether an extension takes part here or below.
-    pub active: bool,
     /// Index into [`Elements::facets`] of parts of curved surfaces that are no whole spheres; else `u32::MAX`.
     pub facets: u32,
-    /// Whether it is a whole sphere seen from outside.
-    pub whole_sphere: bool,
-    /// Whether no two points of the node's side of its surface see each other.
-    pub convex: bool,
 }
 
 impl Element {
@@ -177,9 +179,9 @@ pub struct Elements {
     /// Points that stand for parts of curved surfaces.
     pub facets: Vec<[Facet; FACETS]>,
     /// Sides of surfaces left out because no light can reach them: front and back of each.
-    sealed: Vec<[bool; 2]>,
+    pub(crate) sealed: Vec<[bool; 2]>,
     /// Sides of surfaces that others touch, so that parts of them may be covered.
-    touched: Vec<[bool; 2]>,
+    pub(crate) touched: Vec<[bool; 2]>,
     /// By node: see [`exposed`](Self::exposed).
     pub(crate) exposed: Vec<f32>,
 }

@@ -39,7 +39,8 @@ const BETWEEN_WATCHES: usize = 128;
 const EDGE_DEPTH: u32 = 14;
 
 /// A corner of a leaf's fan.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub struct Corner {
     /// Index of the vertex.
     pub vertex: u32,
@@ -61,11 +62,11 @@ pub struct Vertices {
     /// Where the vertex is on that leaf's surface.
     pub uv: Vec<Vec2>,
     /// Fan of each node: middle first, then the outline, counter-clockwise in (u, v).
-    fans: Vec<Corner>,
-    first: Vec<u32>,
+    pub(crate) fans: Vec<Corner>,
+    pub(crate) first: Vec<u32>,
     /// Leaves around each vertex.
-    around: Vec<u32>,
-    first_around: Vec<u32>,
+    pub(crate) around: Vec<u32>,
+    pub(crate) first_around: Vec<u32>,
 }
 
 impl Vertices {

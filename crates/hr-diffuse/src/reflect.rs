@@ -30,9 +30,9 @@ type Representatives = SmallVec<[(u32, f32); 16]>;
 #[derive(Clone, Debug, Default)]
 pub struct Senders {
     /// By node: where its leaves are in `standing`. Empty for nodes that do not send.
-    ranges: Vec<[u32; 2]>,
+    pub(crate) ranges: Vec<[u32; 2]>,
     /// Leaves, and the share of the sender's area that each stands for.
-    standing: Vec<(u32, f32)>,
+    pub(crate) standing: Vec<(u32, f32)>,
 }
 
 impl Senders {

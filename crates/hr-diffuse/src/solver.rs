@@ -501,7 +501,7 @@ fn progress_fraction(pass: usize, within: f32) -> f32 {
 }
 
 /// Checks a scene and maps it to unit space.
-fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
+pub(crate) fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
     if input.surfaces.is_empty() {
         return Err(SolveError::Empty);
     }

@@ -4,6 +4,7 @@ pub mod builtin;
 pub mod camera;
 pub mod color;
 pub mod error;
+mod fingerprint;
 mod finish;
 pub mod gltf_file;
 pub mod image_file;

@@ -2,7 +2,7 @@
 
 use crate::SceneError;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -18,6 +18,26 @@ pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
 /// As [`read`], with an error that names the file.
 pub(crate) fn read_whole(path: &Path) -> Result<Vec<u8>, SceneError> {
     read(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })
+}
+
+/// The contents of a regular file as 8-byte words in the machine's byte order, ready to be cast to arrays, zeros after the
+/// last byte; and the number of bytes.
+///
+/// # Errors
+/// [`SceneError::Io`] with `path` where it cannot be read, or is no regular file.
+pub fn read_words(path: &Path) -> Result<(Vec<u64>, u64), SceneError> {
+    let read = || {
+        let mut file = File::open(path)?;
+        let found = file.metadata()?;
+        if !found.is_file() {
+            return Err(io::Error::other("not a regular file"));
+        }
+        let length = usize::try_from(found.len()).map_err(io::Error::other)?;
+        let mut words = vec![0_u64; length.div_ceil(size_of::<u64>())];
+        file.read_exact(&mut bytemuck::cast_slice_mut(&mut words)[..length])?;
+        Ok((words, found.len()))
+    };
+    read().map_err(|source| SceneError::Io { path: path.to_owned(), source })
 }
 
 /// Temporary files that are neither renamed nor removed yet.

@@ -7,6 +7,7 @@ use crate::html;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::raycast::RayCaster;
+use crate::solution_file::{self, Accuracy};
 use crate::solved::Solved;
 use crate::stats::{Times, stats};
 use crate::walkthrough::Walkthrough;
@@ -50,7 +51,9 @@ enum Output {
 impl Output {
     /// What the command line asks for; refuses what could not be written before anything is computed.
     fn of(args: &Args) -> Result<Self, ViewError> {
-        args.stats.as_deref().map_or(Ok(()), has_folder)?;
+        for path in [&args.stats, &args.save].into_iter().flatten() {
+            has_folder(path)?;
+        }
         if let Some(path) = &args.image {
             ImageKind::of(path)?;
             has_folder(path)?;
@@ -84,8 +87,7 @@ fn make_folder(folder: &Path) -> Result<(), SceneError> {
 struct Show<'a> {
     args: &'a Args,
     solved: Solved,
-    /// Relative error that the solution is believed to have.
-    error: f32,
+    accuracy: Accuracy,
     progress: &'a Progress,
     /// Time that loading took, and when showing began.
     loaded: Duration,
@@ -106,12 +108,21 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
     }
     let scene = load(args, &progress)?;
     let loaded = progress.elapsed();
-    // The window shows mirrors by their distributions in any mode.
-    let mirrors = scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
-    let distributions = args.mode == Mode::Distributions || mirrors && matches!(output, Output::Window);
-    let (solved, error) = solve(scene, args, distributions, &progress)?;
+    let (solved, accuracy) = match &args.load {
+        Some(path) => solution_file::load(path, scene)?,
+        None => {
+            // The window shows mirrors by their distributions in any mode; what is kept is for every mode.
+            let mirrors = scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
+            let shown = args.mode == Mode::Distributions || mirrors && matches!(output, Output::Window);
+            solve(scene, args, shown || args.save.is_some(), &progress)?
+        }
+    };
+    if let Some(path) = &args.save {
+        progress.at("keeping the solution", 0.0);
+        solution_file::save(path, &solved, accuracy)?;
+    }
     let begin = progress.elapsed();
-    let show = Show { args, solved, error, progress: &progress, loaded, begin };
+    let show = Show { args, solved, accuracy, progress: &progress, loaded, begin };
     match output {
         Output::Window => show.window(),
         Output::Image(path) => show.image(&path),
@@ -142,8 +153,13 @@ fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
 }
 
 /// Solves for the light to the accuracy asked for, or until the time is up or the user has seen enough. Also tells
-/// the relative error that the solution is believed to have.
-fn solve(scene: Arc<Scene>, args: &Args, distributions: bool, progress: &Progress) -> Result<(Solved, f32), ViewError> {
+/// how exact the solution is.
+fn solve(
+    scene: Arc<Scene>,
+    args: &Args,
+    distributions: bool,
+    progress: &Progress,
+) -> Result<(Solved, Accuracy), ViewError> {
     let budget = args.time_budget.map(Duration::from_secs_f64);
     let interrupt = Interrupt::listen();
     let (mut error, mut stopped) = (1.0, false);
@@ -169,7 +185,7 @@ fn solve(scene: Arc<Scene>, args: &Args, distributions: bool, progress: &Progres
     let time = budget.map(|budget| budget.saturating_sub(progress.elapsed()));
     let settings = Settings { error: args.error, budget: Budget { time, ..Budget::default() } };
     let solved = Solved::new(scene, settings, distributions, watch)?;
-    Ok((solved, error))
+    Ok((solved, Accuracy { asked: args.error, believed: error }))
 }
 
 impl Show<'_> {
@@ -241,7 +257,7 @@ impl Show<'_> {
         let now = self.progress.elapsed();
         let times =
             Times { load: self.loaded.as_secs_f64(), show: (now - self.begin).as_secs_f64(), total: now.as_secs_f64() };
-        let stats = stats(&self.solved, self.args.error, self.error, &times);
+        let stats = stats(&self.solved, self.accuracy, &times);
         write_whole(path, |out| {
             serde_json::to_writer_pretty(&mut *out, &stats)?;
             writeln!(out)

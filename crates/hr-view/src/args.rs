@@ -53,12 +53,12 @@ pub struct Args {
     #[arg(long, value_name = "OUT.json")]
     pub stats: Option<PathBuf>,
 
-    /// Keep the solution (not available yet)
+    /// Keep the solution in a file, for --load
     #[arg(long, value_name = "OUT")]
     pub save: Option<PathBuf>,
 
-    /// Look at a kept solution without solving (not available yet)
-    #[arg(long, value_name = "IN")]
+    /// Look at a solution of this SCENE that --save kept, without solving
+    #[arg(long, value_name = "IN", conflicts_with_all = ["save", "error", "time_budget"])]
     pub load: Option<PathBuf>,
 
     /// No window: one self-contained file that walks through the solution in any browser
@@ -79,7 +79,7 @@ impl Args {
     /// Reads a command line, the program's name first.
     ///
     /// # Errors
-    /// [`ViewError::Arguments`], in one line, for what cannot be meant, and for options that are not available yet.
+    /// [`ViewError::Arguments`], in one line, for what cannot be meant, and for modes that are not available yet.
     pub fn read(line: impl IntoIterator<Item = OsString>) -> Result<Parsed, ViewError> {
         let args = match Self::try_parse_from(line) {
             Ok(args) => args,
@@ -88,10 +88,6 @@ impl Args {
             }
             Err(error) => return Err(ViewError::Arguments(one_line(&error))),
         };
-        let later = [("--save", &args.save), ("--load", &args.load)];
-        if let Some((option, _)) = later.iter().find(|(_, value)| value.is_some()) {
-            return Err(ViewError::Arguments(format!("{option} is not available yet; use --image or --frames")));
-        }
         if args.html.is_some() && args.mode != Mode::Distributions {
             return Err(ViewError::Arguments("--html shows distributions; leave --mode out".into()));
         }
@@ -168,6 +164,8 @@ mod tests {
         assert_eq!((all.error, all.time_budget, all.threads), (0.02, Some(10.0), Some(3)), "numbers");
         assert_eq!(all.stats, Some("s.json".into()), "stats");
         assert_eq!(run("--mode gather --image o.exr").mode, Mode::Gather, "stills by a final gather");
+        assert_eq!(run("--save s.hrs").save, Some("s.hrs".into()), "save");
+        assert_eq!(run("room --load s.hrs --threads 2").load, Some("s.hrs".into()), "load");
         assert_eq!(run("--frames out").frames, Some("out".into()), "frames");
     }
 
@@ -188,8 +186,10 @@ mod tests {
             ("--image a.png --frames b", "--frames"),
             ("a.mgf b.mgf", "b.mgf"),
             ("--mode gather", "add --image"),
-            ("--save x", "not available yet"),
-            ("--load x", "not available yet"),
+            ("--save", "--save"),
+            ("--load x --save y", "--save"),
+            ("--load x --error 0.1", "--error"),
+            ("--load x --time-budget 3", "--time-budget"),
             ("--html x --mode samples", "leave --mode out"),
             ("--html x --image a.png", "--image"),
         ];

@@ -1,5 +1,6 @@
 //! Why the program ends with status 1: one line that says what is wrong, where, and what would be right.
 
+use crate::solution_file::SolutionError;
 use crate::window::WindowError;
 use hr_diffuse::SolveError;
 use hr_scene::SceneError;
@@ -17,6 +18,9 @@ pub enum ViewError {
     /// The scene cannot be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// A solution that was kept cannot be shown.
+    #[error(transparent)]
+    Solution(#[from] SolutionError),
     /// The window failed.
     #[error(transparent)]
     Window(#[from] WindowError),

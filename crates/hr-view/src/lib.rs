@@ -11,6 +11,7 @@ pub mod interrupt;
 pub mod path_tracer;
 pub mod progress;
 pub mod raycast;
+pub mod solution_file;
 pub mod solved;
 pub mod stats;
 pub mod walkthrough;

@@ -1,5 +1,6 @@
 //! What `--stats` writes: times, counts, what was skipped and why.
 
+use crate::solution_file::Accuracy;
 use crate::solved::Solved;
 use hr_diffuse::Spent;
 use serde_json::{Value, json};
@@ -19,7 +20,7 @@ pub struct Times {
 /// and values at vertices are part of `display`. `error` is the relative error that the solution is believed to have,
 /// `asked` that which was asked for.
 #[must_use]
-pub fn stats(solved: &Solved, asked: f32, error: f32, times: &Times) -> Value {
+pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
     let solution = &solved.solution;
     let (stats, seconds, skipped) = (&solution.stats, &solution.stats.seconds, &solution.stats.skipped);
     let visibility = seconds.visibility.min(seconds.refine);
@@ -27,8 +28,8 @@ pub fn stats(solved: &Solved, asked: f32, error: f32, times: &Times) -> Value {
     let basis_functions: usize = solution.reflected.iter().map(|haar| haar.basis_functions()).sum();
     json!({
         "scene": solved.scene.name,
-        "error": error,
-        "error_asked": asked,
+        "error": accuracy.believed,
+        "error_asked": accuracy.asked,
         "seconds": {
             "load": times.load,
             "build": seconds.build,

@@ -20,7 +20,7 @@ fn command(arguments: &[&str]) -> Command {
 
 #[test]
 fn mistakes_are_status_1_and_one_line() {
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 11] = [
         (&["no-such-scene"], "room"),
         (&["no-such-file.mgf"], "no-such-file.mgf"),
         (&["--camera", "no-such-camera.json"], "no-such-camera.json"),
@@ -29,6 +29,8 @@ fn mistakes_are_status_1_and_one_line() {
         (&["furnace", "--html", "no/such/folder/a.html"], "no/such/folder/a.html"),
         (&["--mode", "gather"], "add --image"),
         (&["furnace", "--image", "no/such/folder/a.png"], "no/such/folder/a.png"),
+        (&["furnace", "--save", "no/such/folder/a.light"], "no/such/folder/a.light"),
+        (&["furnace", "--load", "Cargo.toml", "--image", "a.png"], "--save"),
         (&["furnace", "--error", "0.9", "--frames", "/dev/null/frames"], "/dev/null/frames"),
     ];
     for (arguments, hint) in cases {
@@ -222,6 +224,37 @@ fn without_a_display_frames_are_written() {
 }
 
 #[cfg(unix)]
+#[test]
+fn kept_solutions_give_the_same_pictures() {
+    let folder = Folder::new("kept");
+    let paths = ["camera.json", "a.light", "solved.pfm", "loaded.pfm", "solved.json", "loaded.json"];
+    let [camera, light, solved, loaded, solved_stats, loaded_stats] = paths.map(|name| folder.path(name));
+    let mut view = hr_scene::Scene::load("room").expect("built in").default_camera();
+    [view.width, view.height] = [20, 12];
+    folder.write("camera.json", &serde_json::to_string(&view).expect("a camera is JSON"));
+    let picture = ["--camera", &camera, "--image"];
+    for mode in ["samples", "distributions"] {
+        let show = ["room", "--mode", mode, "--threads", "2"];
+        let solve = ["--error", "0.9", "--save", &light, "--stats", &solved_stats];
+        succeeds(&[&show[..], &picture, &[&solved], &solve].concat());
+        succeeds(&[&show[..], &picture, &[&loaded], &["--load", &light, "--stats", &loaded_stats]].concat());
+        let [before, after] = [&solved, &loaded].map(|path| std::fs::read(path).expect("written"));
+        assert!(before == after, "{mode}: the same picture, byte by byte");
+        assert!(read_pfm(&loaded).2.iter().any(|&light| light > 0.0), "{mode}: there is light in it");
+        let stats = |path: &str| -> serde_json::Value {
+            serde_json::from_slice(&std::fs::read(path).expect("written")).expect("JSON")
+        };
+        let [before, after] = [&solved_stats, &loaded_stats].map(|path| stats(path));
+        for same in ["error", "error_asked", "counts", "skipped", "iterations", "residuals"] {
+            assert_eq!(before[same], after[same], "{mode}: {same} of the solution");
+        }
+        assert_eq!(after["seconds"]["refine"], 0.0, "{mode}: nothing was solved");
+    }
+    let other = hr_view(&["furnace", "--load", &light, "--image", &loaded]);
+    let text = String::from_utf8_lossy(&other.stderr);
+    assert!(other.status.code() == Some(1) && text.contains("another scene than furnace"), "{text}");
+}
+
 #[test]
 fn ctrl_c_between_frames_ends_at_once_and_leaves_whole_files() {
     let folder = Folder::new("interrupted");

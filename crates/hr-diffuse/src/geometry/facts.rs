@@ -12,7 +12,8 @@ const GAUSS: [f32; 2] = [0.211_324_87, 0.788_675_1];
 pub const FACETS: usize = 16;
 
 /// A small piece of a curved part.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub struct Facet {
     /// Its middle.
     pub point: Vec3,

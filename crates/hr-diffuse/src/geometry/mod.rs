@@ -38,7 +38,8 @@ const LONG: f32 = 2.5;
 /// For a triangle: the sub-triangle with the corners (`u0`, `v0`), (`u1`, `v0`), (`u0`, `v1`), where `u1 − u0` equals
 /// `v1 − v0` and is negative for the middle child, which stands on its head. For all other kinds: the rectangle
 /// between the two corners, `u0 < u1`, `v0 < v1`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub struct Domain {
     /// First corner, u, 0…1.
     pub u0: f32,

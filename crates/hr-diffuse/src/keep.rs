@@ -1,0 +1,356 @@
+//! Solutions to be kept: as flat arrays, and from them again. Geometry is not among them: it comes from the scene, and
+//! whoever restores a solution sees to it that it is the same one.
+//!
+//! What is read is checked as if it came from an enemy: all indices lie within what they point into, the hierarchy is a
+//! tree, all light is finite.
+
+use crate::budget::Spent;
+use crate::flat::{FlatError, Reader, Writer, are_offsets, fits, is_finite};
+use crate::hierarchy::{Element, Elements, Kind, SceneData};
+use crate::hooks::LightField;
+use crate::links::{Link, Links};
+use crate::reconstruct::{Corner, Vertices};
+use crate::reflect::Senders;
+use crate::solution::Solution;
+use crate::solver::scene_data;
+use crate::stats::{Seconds, Skipped, Stats};
+use crate::transport::Exitant;
+use crate::{Rgb, SceneInput, SolveError};
+use std::io;
+use std::time::Instant;
+
+/// An extension whose light can be kept.
+pub trait Keep: LightField {
+    /// Writes what the extension keeps of all nodes, and of its own.
+    ///
+    /// # Errors
+    /// Those of what is written to.
+    fn store(&self, incident: &[Self::Incident], reflected: &[Self::Exitant], out: &mut Writer<'_>) -> io::Result<()>;
+
+    /// Reads it again: incident and exitant light of a hierarchy of so many nodes.
+    ///
+    /// # Errors
+    /// Where it is not what [`store`](Self::store) writes.
+    fn restore(&self, nodes: usize, from: &mut Reader<'_>) -> Result<KeptLight<Self>, FlatError>;
+}
+
+/// Incident and exitant light of every node.
+pub type KeptLight<L> = (Vec<<L as LightField>::Incident>, Vec<<L as LightField>::Exitant>);
+
+impl Keep for () {
+    fn store(&self, _: &[()], _: &[()], _: &mut Writer<'_>) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn restore(&self, nodes: usize, _: &mut Reader<'_>) -> Result<KeptLight<Self>, FlatError> {
+        Ok((vec![(); nodes], vec![(); nodes]))
+    }
+}
+
+/// Why a solution cannot be restored.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RestoreError {
+    /// The scene makes no sense to the solver.
+    #[error(transparent)]
+    Scene(#[from] SolveError),
+    /// The arrays are not those of a solution of this scene.
+    #[error(transparent)]
+    Flat(#[from] FlatError),
+}
+
+impl<L: Keep> Solution<L> {
+    /// Writes all but the scene's geometry and materials.
+    ///
+    /// # Errors
+    /// Those of what is written to.
+    pub fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+        self.stats.store(out)?;
+        self.elements.store(out)?;
+        self.exitant.store(out)?;
+        out.put(self.links.all())?;
+        self.vertices.store(out)?;
+        out.put(&self.faint)?;
+        self.field.store(&self.incident, &self.reflected, out)
+    }
+
+    /// Reads what [`store`](Self::store) wrote of a solution of the same scene. Of [`Stats::seconds`] there are those that
+    /// this took; the other statistics are those of the solve.
+    ///
+    /// # Errors
+    /// Where the scene cannot be used, or the arrays are not those of a solution of a scene like this.
+    pub fn restore(input: &SceneInput, field: L, from: &mut Reader<'_>) -> Result<Self, RestoreError> {
+        let start = Instant::now();
+        let scene = scene_data(input)?;
+        let mut stats = Stats::restore(from)?;
+        let elements = Elements::restore(&scene, from)?;
+        let count = elements.nodes.len();
+        let exitant = Exitant::restore(count, from)?;
+        let links = restore_links(count, from)?;
+        let vertices = Vertices::restore(&elements, from)?;
+        let faint: Vec<Rgb> = from.take_finite("faint materials")?;
+        fits(faint.len() == scene.materials.len(), "faint materials")?;
+        let (incident, reflected) = field.restore(count, from)?;
+        fits(incident.len() == count && reflected.len() == count, "extension's light")?;
+        stats.seconds.build = start.elapsed().as_secs_f64();
+        Ok(Self { scene, elements, exitant, links, vertices, field, incident, reflected, faint, stats })
+    }
+}
+
+impl Elements {
+    fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+        out.put(&self.nodes)?;
+        out.put(&self.surface_nodes)?;
+        out.put(&self.facets)?;
+        out.put(self.sealed.as_flattened())?;
+        out.put(self.touched.as_flattened())?;
+        out.put(&self.exposed)
+    }
+
+    fn restore(scene: &SceneData, from: &mut Reader<'_>) -> Result<Self, FlatError> {
+        let sides = |flags: Vec<bool>| flags.as_chunks().0.to_vec();
+        let elements = Self {
+            nodes: from.take("elements")?,
+            surface_nodes: from.take("elements of surfaces")?,
+            facets: from.take_finite("facets")?,
+            sealed: sides(from.take("sealed sides")?),
+            touched: sides(from.take("touched sides")?),
+            exposed: from.take_finite("exposed shares")?,
+        };
+        let surfaces = scene.surfaces().len();
+        fits(elements.nodes.first().is_some_and(|root| root.parent == 0), "elements")?;
+        let all = elements.nodes.iter().enumerate();
+        fits(all.into_iter().all(|(id, element)| elements.is_sound(scene, id, element)), "elements")?;
+        fits(elements.surface_nodes.len() == surfaces, "elements of surfaces")?;
+        let all = elements.surface_nodes.iter().enumerate();
+        let mut sides = all.flat_map(|(surface, sides)| {
+            std::iter::zip([Kind::Front, Kind::Back], sides).map(move |(kind, &node)| (surface, kind, node))
+        });
+        let is_right = |(surface, kind, node): (usize, Kind, u32)| {
+            let element = elements.nodes.get(node as usize);
+            let is_its_own = |e: &Element| e.kind == kind && e.source == scene.twins[surface];
+            node == u32::MAX || element.is_some_and(is_its_own)
+        };
+        fits(sides.all(is_right), "elements of surfaces")?;
+        fits(elements.sealed.len() == surfaces && elements.touched.len() == surfaces, "sides")?;
+        Ok(elements)
+    }
+
+    /// Whether a node that was read is one, in its place in the tree.
+    fn is_sound(&self, scene: &SceneData, id: usize, element: &Element) -> bool {
+        let parent = element.parent as usize;
+        let is_child = id == 0
+            || parent < id && {
+                let above = &self.nodes[parent];
+                above.has_child(id)
+                    && (!above.is_patch() || (above.kind, above.source) == (element.kind, element.source))
+            };
+        let end = u64::from(element.first_child) + u64::from(element.child_count);
+        let has_children =
+            element.child_count == 0 || element.first_child as usize > id && end <= self.nodes.len() as u64;
+        let source = element.source as usize;
+        let stands_for = match element.kind {
+            Kind::Cluster => true,
+            Kind::Light => source < scene.lights.len() && element.child_count == 0,
+            Kind::Front | Kind::Back => scene.surface_materials.get(source) == Some(&element.material),
+        };
+        let has_facets = element.facets == u32::MAX || (element.facets as usize) < self.facets.len();
+        let numbers = [element.radius, element.area, element.importance];
+        let vectors = [element.bounds[0], element.bounds[1], element.center, element.reflectance];
+        let has_numbers = is_finite(&numbers)
+            && is_finite(&vectors)
+            && is_finite(&[element.normals])
+            && is_finite(&[element.facing])
+            && is_finite(&[element.domain]);
+        is_child && has_children && stands_for && has_facets && has_numbers
+    }
+}
+
+impl Element {
+    /// Whether a node is among the children of this one.
+    fn has_child(&self, node: usize) -> bool {
+        let first = self.first_child as usize;
+        (first..first + self.child_count as usize).contains(&node)
+    }
+}
+
+impl Exitant {
+    fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+        out.put(&self.radiosity)?;
+        out.put(&self.range)?;
+        out.put(&self.facing)?;
+        out.put(&self.irradiance)?;
+        out.put(&self.directional)?;
+        out.put(&self.reflected_as)?;
+        out.put(&self.gain)?;
+        out.put(&self.peak)?;
+        let (leaves, shares): (Vec<u32>, Vec<f32>) = self.senders.standing.iter().copied().unzip();
+        out.put(&self.senders.ranges)?;
+        out.put(&leaves)?;
+        out.put(&shares)
+    }
+
+    fn restore(nodes: usize, from: &mut Reader<'_>) -> Result<Self, FlatError> {
+        const SENDERS: &str = "senders of directional light";
+        let exitant = Self {
+            radiosity: from.take_finite("radiosities")?,
+            range: from.take_finite("ranges of radiosity")?,
+            facing: from.take_finite("directions of radiosity")?,
+            irradiance: from.take_finite("irradiances")?,
+            directional: from.take_finite("directional light")?,
+            reflected_as: from.take("nodes that stand for others")?,
+            gain: from.take_finite("gains")?,
+            peak: from.take_finite("peaks")?,
+            senders: Senders {
+                ranges: from.take(SENDERS)?,
+                standing: std::iter::zip(from.take::<u32>(SENDERS)?, from.take_finite::<f32>(SENDERS)?).collect(),
+            },
+        };
+        let lengths = [
+            exitant.radiosity.len(),
+            exitant.range.len(),
+            exitant.facing.len(),
+            exitant.irradiance.len(),
+            exitant.directional.len(),
+            exitant.reflected_as.len(),
+            exitant.gain.len(),
+            exitant.peak.len(),
+        ];
+        fits(lengths.iter().all(|&length| length == nodes), "arrays by node")?;
+        fits(exitant.reflected_as.iter().all(|&node| (node as usize) < nodes), "nodes that stand for others")?;
+        let Senders { ranges, standing } = &exitant.senders;
+        let are_within = ranges.iter().all(|&[first, end]| first <= end && end as usize <= standing.len());
+        fits(are_within && standing.iter().all(|&(leaf, _)| (leaf as usize) < nodes), SENDERS)?;
+        Ok(exitant)
+    }
+}
+
+fn restore_links(nodes: usize, from: &mut Reader<'_>) -> Result<Links, FlatError> {
+    let links: Vec<Link> = from.take("links")?;
+    let is_sound = |link: &Link| {
+        (link.receiver as usize) < nodes
+            && (link.sender as usize) < nodes
+            && link.factor.is_finite()
+            && link.visibility.is_finite()
+    };
+    fits(links.iter().all(is_sound), "links")?;
+    Ok(Links::new(links, nodes))
+}
+
+impl Vertices {
+    fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+        out.put(&self.positions)?;
+        out.put(&self.normals)?;
+        out.put(&self.irradiance)?;
+        out.put(&self.leaf)?;
+        out.put(&self.uv)?;
+        out.put(&self.fans)?;
+        out.put(&self.first)?;
+        out.put(&self.around)?;
+        out.put(&self.first_around)
+    }
+
+    fn restore(elements: &Elements, from: &mut Reader<'_>) -> Result<Self, FlatError> {
+        let vertices = Self {
+            positions: from.take_finite("vertices")?,
+            normals: from.take_finite("normals of vertices")?,
+            irradiance: from.take_finite("irradiances of vertices")?,
+            leaf: from.take("leaves of vertices")?,
+            uv: from.take_finite("parameters of vertices")?,
+            fans: from.take::<Corner>("fans")?,
+            first: from.take("fans")?,
+            around: from.take("leaves around vertices")?,
+            first_around: from.take("leaves around vertices")?,
+        };
+        let count = vertices.positions.len();
+        let lengths = [vertices.normals.len(), vertices.irradiance.len(), vertices.leaf.len(), vertices.uv.len()];
+        fits(lengths.iter().all(|&length| length == count), "vertices")?;
+        let is_leaf = |&leaf: &u32| {
+            elements.nodes.get(leaf as usize).is_some_and(|element| element.is_patch() && element.child_count == 0)
+        };
+        fits(vertices.leaf.iter().all(is_leaf), "leaves of vertices")?;
+        fits(are_offsets(&vertices.first, elements.nodes.len(), vertices.fans.len()), "fans")?;
+        let is_corner = |corner: &Corner| (corner.vertex as usize) < count && corner.uv.is_finite();
+        fits(vertices.fans.iter().all(is_corner), "fans")?;
+        fits(elements.patch_leaves().all(|leaf| !vertices.fan(leaf).is_empty()), "fans")?;
+        let around = are_offsets(&vertices.first_around, count, vertices.around.len());
+        fits(around && vertices.around.iter().all(is_leaf), "leaves around vertices")?;
+        Ok(vertices)
+    }
+}
+
+impl Stats {
+    fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+        let Self {
+            polygons,
+            nodes,
+            leaves,
+            links,
+            rays,
+            vertex_rays,
+            pairs,
+            iterations,
+            ref residuals,
+            stopped,
+            spent,
+            bytes,
+            skipped,
+            seconds: _,
+        } = *self;
+        let Skipped {
+            black_receivers,
+            unlit_senders,
+            facing,
+            proved_free,
+            sealed_sides,
+            converged_leaves,
+            faint_links,
+        } = skipped;
+        let spent = match spent {
+            None => 0_u64,
+            Some(Spent::Time) => 1,
+            Some(Spent::Memory) => 2,
+        };
+        out.put(&[polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations.into(), bytes])?;
+        out.put(&[stopped.into(), spent])?;
+        out.put(&[black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves, faint_links])?;
+        out.put(residuals)
+    }
+
+    fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
+        const WHAT: &str = "statistics";
+        let [polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations, bytes] = from.take_exactly(WHAT)?;
+        let [stopped, spent] = from.take_exactly::<u64, 2>(WHAT)?;
+        let [black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves, faint_links] =
+            from.take_exactly(WHAT)?;
+        Ok(Self {
+            polygons,
+            nodes,
+            leaves,
+            links,
+            rays,
+            vertex_rays,
+            pairs,
+            iterations: u64::try_into(iterations).map_err(|_| FlatError::Misfit(WHAT))?,
+            residuals: from.take(WHAT)?,
+            stopped: stopped != 0,
+            spent: match spent {
+                0 => None,
+                1 => Some(Spent::Time),
+                2 => Some(Spent::Memory),
+                _ => return Err(FlatError::Misfit(WHAT)),
+            },
+            bytes,
+            skipped: Skipped {
+                black_receivers,
+                unlit_senders,
+                facing,
+                proved_free,
+                sealed_sides,
+                converged_leaves,
+                faint_links,
+            },
+            seconds: Seconds::default(),
+        })
+    }
+}
