@@ -73,8 +73,7 @@ pub(crate) struct Push {
 
 impl Push {
     /// Finds the weights of the leaves, for a solution with the given relative error; where there is none, and where `watch`
-    /// breaks, by orientation and distance alone. The weights that are kept take
-    /// no more than `room` bytes.
+    /// breaks, by orientation and distance alone. The weights that are kept take no more than `room` bytes.
     pub(crate) fn new<L: LightField>(
         light: Light<'_, L>,
         links: &Links,
