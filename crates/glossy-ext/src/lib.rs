@@ -10,7 +10,7 @@ pub mod reflector;
 pub mod samples;
 
 pub use field::GlossyField;
-pub use hr_diffuse::Rgb;
+pub use hr_diffuse::{Rgb, hooks};
 pub use reflector::{
     Compensated, Incident, Lambert, Lobe, MerlError, MetallicRoughness, Phong, Reflector, ReflectorError, Sample, Sum,
     Tabulated, Ward,

@@ -18,7 +18,6 @@ use obvhs::BvhBuildParams;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 use smallvec::SmallVec;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Children per cluster: the binary tree is widened to it.
@@ -536,13 +535,6 @@ impl Tree {
 }
 
 impl Hierarchy for Elements {
-    fn node_count(&self) -> usize {
-        self.nodes.len()
-    }
-    fn children(&self, node: NodeId) -> Range<u32> {
-        let e = &self.nodes[node.index()];
-        e.first_child..e.first_child + e.child_count
-    }
     fn parent(&self, node: NodeId) -> Option<NodeId> {
         (node.0 != 0).then(|| NodeId(self.nodes[node.index()].parent))
     }
@@ -554,9 +546,6 @@ impl Hierarchy for Elements {
     }
     fn normals(&self, node: NodeId) -> Cone {
         self.nodes[node.index()].normals
-    }
-    fn area(&self, node: NodeId) -> f32 {
-        self.nodes[node.index()].area
     }
     fn material(&self, node: NodeId) -> Option<u32> {
         let e = &self.nodes[node.index()];

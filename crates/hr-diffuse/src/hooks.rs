@@ -15,9 +15,8 @@
 //! Receivers run in parallel; each call writes only what it is given or returns, and reads only what the step
 //! before made: gather reads exitant and writes incident light, reflect the reverse.
 
-use crate::{Cone, Rgb};
+pub use crate::{Cone, Rgb};
 use glam::Vec3;
-use std::ops::Range;
 
 /// Index of an element of the hierarchy. Children are contiguous and come after their parent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -35,10 +34,6 @@ impl NodeId {
 /// What an engine shows to extensions: a read-only view of its element hierarchy. Lengths are in the engine's
 /// own unit; extensions use them only relative to each other.
 pub trait Hierarchy: Sync {
-    /// Number of nodes; ids are below it.
-    fn node_count(&self) -> usize;
-    /// Children of a node, empty for a leaf.
-    fn children(&self, node: NodeId) -> Range<u32>;
     /// Parent of a node, `None` for the root.
     fn parent(&self, node: NodeId) -> Option<NodeId>;
     /// A point in the middle of the node: on the surface for elements of a surface, that of the box for clusters.
@@ -47,8 +42,6 @@ pub trait Hierarchy: Sync {
     fn radius(&self, node: NodeId) -> f32;
     /// Directions of the node's surface normals, on the side that the node stands for.
     fn normals(&self, node: NodeId) -> Cone;
-    /// Surface area of the node (one side).
-    fn area(&self, node: NodeId) -> f32;
     /// Material of an element of a surface; `None` for clusters and for lights without extent.
     fn material(&self, node: NodeId) -> Option<u32>;
     /// Unit direction toward a sender as seen from `at`, and the angular radius (radians) of a disk that subtends
@@ -124,7 +117,7 @@ pub trait LightField: Sync {
         arrived: Arrived,
     ) -> Self::Exitant;
     /// Exitant radiance (W/(m² sr)) in a direction away from a node, without the diffuse part. For nodes that are
-    /// not flat: radiant intensity per unit of [`Hierarchy::area`].
+    /// not flat: radiant intensity per unit of the node's surface area (one side).
     fn radiance(&self, exitant: &Self::Exitant, away: Vec3) -> Rgb;
     /// Smallest and largest [`radiance`](Self::radiance) over a cone of directions.
     fn radiance_bounds(&self, exitant: &Self::Exitant, away: &Cone) -> (Rgb, Rgb);
