@@ -52,7 +52,7 @@ impl Answer {
             mean(with(FLOOR).zip(&floor).map(|(patch, light)| {
                 let patch = &engine.patches[patch];
                 let away = (eye - patch.center).normalize();
-                (light.eval(away).y * away.dot(patch.normal), patch.area)
+                (engine.glossy.field.radiance(light, away).y * away.dot(patch.normal), patch.area)
             }))
         };
         let ceiling = power.iter().zip(area).map(|(power, area)| power / area).collect();

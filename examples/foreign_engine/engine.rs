@@ -128,7 +128,10 @@ impl Engine {
         let glossy = &self.glossy; // +
         let irradiance = |to: usize| {
             let share = self.share(from, to);
-            let toward = (patches[to].center - patches[from].center).normalize_or_zero(); // +
+            if share <= 0.0 {
+                return Vec3::ZERO;
+            }
+            let toward = (patches[to].center - patches[from].center).normalize(); // +
             let unshot = unshot + glossy.radiosity(&directional, toward); // +
             unshot * share
         };

@@ -1,13 +1,21 @@
-//! All that the engine had to be given for glossy light. It keeps the illumination samples of each patch apart by whether
-//! the patch has shot their reflection: the unshot ones are to glossy light what unshot radiosity is to diffuse light.
+//! All that the engine had to be given for glossy light. Of each patch it keeps the illumination samples whose reflection
+//! is still to be shot: they are to glossy light what unshot radiosity is to diffuse light.
 
 use crate::engine::Patch;
 use glam::Vec3;
-use glossy_ext::haar::Haar;
 use glossy_ext::hooks::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
-use glossy_ext::{GlossyField, SampleSet};
 use rayon::prelude::*;
-use std::f32::consts::{FRAC_1_PI, PI};
+use std::f32::consts::PI;
+
+/// The extension; tests watch what it is asked to do.
+#[cfg(not(test))]
+pub(crate) type Field = glossy_ext::GlossyField;
+#[cfg(test)]
+pub(crate) type Field = glossy_ext::hooks::conformance::Watched<glossy_ext::GlossyField>;
+
+/// Incident and exitant light of a patch.
+type Incident = <Field as LightField>::Incident;
+type Exitant = <Field as LightField>::Exitant;
 
 /// The patches as extensions see them: a hierarchy of leaves alone.
 struct Leaves<'a>(&'a [Patch]);
@@ -33,20 +41,21 @@ impl Hierarchy for Leaves<'_> {
 /// Illumination samples of a patch.
 #[derive(Default)]
 struct Samples {
-    unshot: SampleSet,
-    shot: SampleSet,
+    all: Incident,
+    /// Those whose reflection is still to be shot.
+    unshot: Incident,
     /// The sum of the unshot ones, W/m².
     irradiance: Vec3,
 }
 
 /// Glossy light of all patches.
 pub(crate) struct Glossy {
-    field: GlossyField,
+    pub(crate) field: Field,
     samples: Vec<Samples>,
 }
 
 impl Glossy {
-    pub(crate) fn new(field: GlossyField, patches: usize) -> Self {
+    pub(crate) fn new(field: Field, patches: usize) -> Self {
         Self { field, samples: std::iter::repeat_with(Samples::default).take(patches).collect() }
     }
 
@@ -56,23 +65,21 @@ impl Glossy {
     }
 
     /// Reflects what a patch has still to shoot, which counts as shot then.
-    pub(crate) fn take_unshot(&mut self, patches: &[Patch], patch: usize) -> Haar {
+    pub(crate) fn take_unshot(&mut self, patches: &[Patch], patch: usize) -> Exitant {
         let samples = &mut self.samples[patch];
         let irradiance = std::mem::take(&mut samples.irradiance);
         let light = reflect(&self.field, patches, patch, &samples.unshot, irradiance);
-        samples.shot.append(&mut samples.unshot);
+        self.field.clear(&mut samples.unshot);
         light
     }
 
     /// All glossy light of a patch, at the end.
-    pub(crate) fn leaving(&self, patches: &[Patch], patch: usize) -> Haar {
-        let samples = &self.samples[patch];
-        let all = [samples.shot.as_slice(), &samples.unshot].concat();
-        reflect(&self.field, patches, patch, &all, patches[patch].irradiance)
+    pub(crate) fn leaving(&self, patches: &[Patch], patch: usize) -> Exitant {
+        reflect(&self.field, patches, patch, &self.samples[patch].all, patches[patch].irradiance)
     }
 
     /// What a diffuse patch would have to send so as to be as bright from a direction.
-    pub(crate) fn radiosity(&self, light: &Haar, toward: Vec3) -> Vec3 {
+    pub(crate) fn radiosity(&self, light: &Exitant, toward: Vec3) -> Vec3 {
         PI * self.field.radiance(light, toward)
     }
 
@@ -84,6 +91,7 @@ impl Glossy {
             if irradiance != Vec3::ZERO && field.active(patch.paint as u32).is_some() {
                 let direction = (patches[from].center - patch.center).normalize();
                 let transfer = Transfer { sender: NodeId(from as u32), direction, irradiance, oriented: true };
+                field.receive(&mut samples.all, &transfer);
                 field.receive(&mut samples.unshot, &transfer);
                 samples.irradiance += irradiance;
             }
@@ -92,9 +100,12 @@ impl Glossy {
 }
 
 /// The glossy reflection of some of a patch's samples.
-fn reflect(field: &GlossyField, patches: &[Patch], patch: usize, samples: &SampleSet, irradiance: Vec3) -> Haar {
-    let paint = field.reflector(patches[patch].paint as u32);
-    let diffuse = paint.map_or(Vec3::ZERO, |paint| paint.diffuse()) * irradiance * FRAC_1_PI;
-    let arrived = Arrived { irradiance, diffuse, spread: patches[patch].bend };
+fn reflect(field: &Field, patches: &[Patch], patch: usize, samples: &Incident, irradiance: Vec3) -> Exitant {
+    let paint = patches[patch].paint as u32;
+    if field.active(paint).is_none() {
+        return Exitant::default();
+    }
+    // Diffuse light is the engine's own.
+    let arrived = Arrived { irradiance, diffuse: Vec3::ZERO, spread: patches[patch].bend };
     field.reflect(&Leaves(patches), NodeId(patch as u32), &[samples], arrived)
 }

@@ -35,7 +35,10 @@ fn engine(scene: &Scene, fineness: f64) -> Engine {
         exitance: material.exitance,
     };
     let paints = scene.materials.iter().map(paint).collect();
-    let glossy = Glossy::new(GlossyField::new(&scene.reflectors(), Refinement::default()), patches.len());
+    let field = GlossyField::new(&scene.reflectors(), Refinement::default());
+    #[cfg(test)]
+    let field = glossy_ext::hooks::conformance::Watched::new(field);
+    let glossy = Glossy::new(field, patches.len());
     Engine::new(patches, paints, glossy)
 }
 

@@ -28,6 +28,8 @@ fn both_engines_agree() {
     for (theirs, ours) in theirs.floor.iter().zip(&ours.floor) {
         assert!((theirs / ours - 1.0).abs() < AGREEMENT, "floor: {theirs}, {ours}");
     }
+    let tally = foreign.glossy.field.verdict().unwrap_or_else(|faults| panic!("{faults}"));
+    assert!(tally.reflections > 1000 && (tally.ratio - 1.0).abs() < 0.01, "samples are all the light: {tally:?}");
     // What is compared is glossy light for the most part.
     let mut diffuse = Scene::load("glossy-sphere").expect("a built-in scene");
     for material in &mut diffuse.materials {

@@ -3,5 +3,6 @@
 mod determinism;
 mod diffuse;
 mod furnace;
+mod hooks;
 mod invariance;
 mod scenes;

@@ -207,10 +207,13 @@ impl LightField for GlossyField {
     }
 
     fn receive(&self, incident: &mut SampleSet, transfer: &Transfer) {
+        debug_assert_eq!(transfer.fault(), None, "the host keeps to what the hooks ask for: {transfer:?}");
         incident.push(IlluminationSample::new(transfer));
     }
 
     fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], arrived: Arrived) -> Haar {
+        debug_assert_eq!(arrived.fault(), None, "the host keeps to what the hooks ask for: {arrived:?}");
+        debug_assert!(!path.is_empty(), "the path of leaf {} has the leaf itself in it", leaf.0);
         let Some(material) = self.material(hierarchy.material(leaf)) else { return Haar::default() };
         let place = Place::along(hierarchy.center(leaf), hierarchy.normals(leaf).axis, material.reflector.grain());
         let mut incident = Vec::new();

@@ -1,24 +1,59 @@
 //! The hooks: what an engine shows to extensions, and what an extension does with the light that passes.
 //!
-//! An engine owns one [`LightField::Incident`] and one [`LightField::Exitant`] per node of its hierarchy and calls,
-//! in each iteration:
+//! An engine (the *host*) implements [`Hierarchy`] and calls [`LightField`]; an extension implements [`LightField`] and asks
+//! [`Hierarchy`]. The host owns one [`LightField::Incident`] and one [`LightField::Exitant`] per node that needs one, made by
+//! `Default`, which means "nothing here".
 //!
-//! 1. [`clear`](LightField::clear) on the incident light of every active node,
-//! 2. [`receive`](LightField::receive) once per link, on the receiver's own incident light (*gather*),
-//! 3. [`reflect`](LightField::reflect) for every active leaf, with the incident light of all nodes on the path from
-//!    the root down to it: their union is what arrives there (*push*, without a copy),
-//! 4. [`radiance`](LightField::radiance) and its bounds for the leaves that stand for a sender: inner nodes shine with
-//!    the light of leaves below them (*pull*).
+//! # What is called when
 //!
-//! Leaves whose light no link asks for may be left out of 3.
+//! [`active`](LightField::active) once per material, before anything else; its answer never changes. Then, in each
+//! iteration, in this order:
 //!
-//! Receivers run in parallel; each call writes only what it is given or returns, and reads only what the step
-//! before made: gather reads exitant and writes incident light, reflect the reverse.
+//! | step | call | on | writes | reads |
+//! | --- | --- | --- | --- | --- |
+//! | | [`clear`](LightField::clear) | every active receiver | its incident light | |
+//! | gather | [`radiance`](LightField::radiance), [`radiance_bounds`](LightField::radiance_bounds) | senders | | exitant light |
+//! | gather | [`receive`](LightField::receive) | the receiver of each link that carries light | its incident light | |
+//! | push, reflect | [`reflect`](LightField::reflect) | active leaves | makes the leaf's exitant light | incident light from the leaf up to the root |
+//!
+//! - *Push* needs no call: what arrives at a leaf is the union of what the nodes on its path from the root received.
+//! - *Pull* needs none, either: inner nodes shine with the light of leaves below them, which the host adds up in the
+//!   direction that it asks for.
+//! - Leaves whose light nobody asks for need not be reflected; materials that are not active need no state.
+//! - A host that gathers calls `clear` in every iteration. One that shoots, where every call of `receive` brings light that
+//!   has not been reflected yet, calls it when it has reflected that light.
+//!
+//! # From which thread
+//!
+//! From any, and from many at once: the extension is shared (`Sync`). A call writes nothing but what it is given as
+//! `&mut` or returns, and within a step nobody reads what the step writes. So receivers run in parallel, each on its own
+//! state, and results do not depend on the number of threads as long as each receiver gets its light in the same order.
+//!
+//! # What holds
+//!
+//! A host keeps to this, and the extension relies on it:
+//!
+//! - Geometry does not change between `receive` and `reflect`; nodes may be added.
+//! - Directions are unit vectors in the frame of the hierarchy, toward a sender or away from a node, and
+//!   [`Transfer::direction`] is that of [`Hierarchy::direction_to`] from the receiver's centre.
+//! - Light is finite and not negative, irradiance in W/m². The exitant radiance of the extension counts as π times itself
+//!   where radiosity does.
+//! - [`Transfer::oriented`] tells what [`Hierarchy::is_flat`] tells of the receiver.
+//! - Parents hold their children, and `path` is the leaf and its ancestors, in order; those at the upper end that never
+//!   receive light may be missing.
+//! - [`Arrived::irradiance`] is what the samples of the path add up to at the leaf, but for visibility within ancestors.
+//! - Only leaves of active materials are reflected.
+//!
+//! What can be seen of this in a single call, debug builds assert ([`Transfer::fault`], [`Arrived::fault`]); all of it is
+//! checked by a field of [`conformance`], which a host puts in the place of its extension for a test.
+
+pub mod conformance;
 
 pub use crate::{Cone, Rgb};
 use glam::Vec3;
+use std::f32::consts::PI;
 
-/// Index of an element of the hierarchy. Children are contiguous and come after their parent.
+/// Index of an element of the hierarchy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(transparent)]
 pub struct NodeId(pub u32);
@@ -79,6 +114,17 @@ pub struct Transfer {
     pub oriented: bool,
 }
 
+impl Transfer {
+    /// What is wrong with it, if anything is that can be seen without the hierarchy.
+    #[must_use]
+    pub fn fault(&self) -> Option<&'static str> {
+        if !self.direction.is_normalized() {
+            return Some("the direction is not a unit vector");
+        }
+        (!is_light(self.irradiance)).then_some("the irradiance is negative or not finite")
+    }
+}
+
 /// What a leaf received in all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrived {
@@ -89,6 +135,25 @@ pub struct Arrived {
     /// The leaf stands for others, too, whose normals are within this angle (radians) of its own: detail finer than what
     /// that makes of a reflection is lost.
     pub spread: f32,
+}
+
+impl Arrived {
+    /// What is wrong with it, if anything is.
+    #[must_use]
+    pub fn fault(&self) -> Option<&'static str> {
+        if !is_light(self.irradiance) {
+            return Some("the irradiance is negative or not finite");
+        }
+        if !is_light(self.diffuse) {
+            return Some("the diffuse radiance is negative or not finite");
+        }
+        (!(0.0..=PI).contains(&self.spread)).then_some("the spread is not within 0…π")
+    }
+}
+
+/// Whether light is finite and not negative.
+fn is_light(light: Rgb) -> bool {
+    light.is_finite() && light.min_element() >= 0.0
 }
 
 /// What light does besides being diffuse radiosity. `()` is the purely diffuse engine, at no cost.
