@@ -1,6 +1,9 @@
 //! Glossy global illumination for hierarchical radiosity: illumination samples, directional distributions and
 //! reflectors, after Stamminger et al., "Efficient Glossy Global Illumination with Interactive Viewing", Computer
-//! Graphics Forum 19(1), 2000. It plugs into an engine through the hooks of `hr-diffuse` only.
+//! Graphics Forum 19(1), 2000. It plugs into an engine through the [`hooks`] of `hr-diffuse` only.
+//!
+//! # Features
+//! `parallel` (default): that of `hr-diffuse`.
 
 pub mod conformance;
 pub mod field;
@@ -16,3 +19,12 @@ pub use reflector::{
     Tabulated, Ward,
 };
 pub use samples::{IlluminationSample, Place, SampleSet, arriving};
+
+/// What is glossy goes to other threads and is shared among them, as diffuse light is.
+const _: () = {
+    const fn is_shared<T: Send + Sync + ?Sized>() {}
+    is_shared::<dyn Reflector>();
+    is_shared::<hr_diffuse::Solver<GlossyField>>();
+    is_shared::<hr_diffuse::Solution<GlossyField>>();
+    is_shared::<haar::Haar>();
+};

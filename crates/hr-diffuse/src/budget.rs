@@ -4,8 +4,8 @@ use crate::gather;
 use crate::hierarchy::{Element, Elements};
 use crate::hooks::LightField;
 use crate::links::Link;
+use crate::threads::prelude::*;
 use crate::{Facing, Rgb};
-use rayon::prelude::*;
 use std::time::{Duration, Instant};
 
 /// What a solve may cost; without limits by default.

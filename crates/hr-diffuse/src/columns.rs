@@ -8,8 +8,8 @@
 use crate::Rgb;
 use crate::hooks::LightField;
 use crate::links::Links;
+use crate::threads::prelude::*;
 use crate::transport::Light;
-use rayon::prelude::*;
 
 /// Of what a leaf does not reflect diffusely, links may carry so much as directional light at first. What the links of a
 /// sender carry errs either way; to cut it off at what is right on average would lose light.

@@ -11,9 +11,9 @@ use crate::geometry::{Domain, Geometry};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::sampling::{cosine_direction, hash, point2};
 use crate::sealed::{Side, is_back, outward};
+use crate::threads::prelude::*;
 use crate::visibility::Region;
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 
 /// Points of a leaf that are looked from at first, and where some of them see what nobody else does.
 const FIRST_POINTS: u32 = 6;

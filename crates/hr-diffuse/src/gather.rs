@@ -6,8 +6,8 @@ use crate::hooks::{LightField, NodeId, Transfer};
 use crate::leaf_rows::{LeafRow, closed};
 use crate::links::{Link, Links};
 use crate::push::{self, Push, Spread, visible};
+use crate::threads::{self, prelude::*};
 use crate::transport::Light;
-use rayon::prelude::*;
 use std::ops::ControlFlow;
 
 /// Links that a thread evaluates between two calls of `watch`: about a millisecond.
@@ -99,7 +99,7 @@ impl Gather {
         incident: &mut [L::Incident],
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        let chunk = BETWEEN_WATCHES * rayon::current_num_threads();
+        let chunk = BETWEEN_WATCHES * threads::current_num_threads();
         let mut arriving = std::mem::take(&mut self.arriving);
         arriving.resize(links.all().len(), Rgb::ZERO);
         let parts = links.all().chunks(chunk).zip(self.push.spreads.chunks(chunk));
@@ -126,7 +126,7 @@ impl Gather {
         incident: &mut [L::Incident],
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        let chunk = BETWEEN_WATCHES / 16 * rayon::current_num_threads();
+        let chunk = BETWEEN_WATCHES / 16 * threads::current_num_threads();
         for (i, incident) in incident.chunks_mut(chunk).enumerate() {
             if watch().is_break() {
                 return ControlFlow::Break(());

@@ -11,12 +11,12 @@ use crate::hooks::{FLAT_COSINE, Hierarchy, NodeId};
 use crate::scene::{Light, LightKind};
 use crate::sealed::{Side, is_back, lit_sides};
 use crate::skips::Skips;
+use crate::threads::prelude::*;
 use crate::visibility::Visibility;
 use crate::{Cone, DiffuseMaterial, Facing, Rgb, SurfaceReflectance};
 use glam::{Vec2, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
-use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::sync::Arc;
 

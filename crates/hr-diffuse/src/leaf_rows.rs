@@ -6,8 +6,8 @@ use crate::hierarchy::Kind;
 use crate::hooks::LightField;
 use crate::rows::MOST_RAISE;
 use crate::sampling::{cosine_direction, hash, point2};
+use crate::threads::prelude::*;
 use crate::transport::Light;
-use rayon::prelude::*;
 
 /// Sums of form factors times visibility of a leaf, by which its light is balanced.
 #[derive(Clone, Copy, Debug)]

@@ -5,6 +5,10 @@
 //! Interactive Viewing", Computer Graphics Forum 19(1), 2000. The way of the light through the modules:
 //! [`scene`] → [`hierarchy`] → ([`oracle`] → refinement → [`links`], with [`form_factor`] and [`visibility`]) →
 //! gather → push → [`hooks`]' reflect → pull ([`solver`]) → [`reconstruct`] → [`solution`].
+//!
+//! # Features
+//! `parallel` (default): all cores, by rayon, in the pool of whoever calls. Without it there is one thread, and the answer
+//! is the same, bit by bit.
 
 pub mod budget;
 mod columns;
@@ -37,6 +41,7 @@ pub mod solution;
 pub mod solver;
 pub mod stats;
 mod steady;
+pub mod threads;
 pub mod transport;
 mod twins;
 pub mod visibility;
@@ -55,3 +60,13 @@ pub use visibility::{Hit, Visibility};
 
 /// A linear RGB triple: reflectance, radiosity, irradiance (W/m²) or radiance (W/(m² sr)), as its context says.
 pub type Rgb = glam::Vec3;
+
+/// Solvers and solutions go to other threads and are shared among them.
+const _: () = {
+    const fn is_shared<T: Send + Sync>() {}
+    is_shared::<SceneInput>();
+    is_shared::<Solver>();
+    is_shared::<Solution>();
+    is_shared::<SolveError>();
+    is_shared::<hooks::conformance::Watched<()>>();
+};

@@ -1,6 +1,6 @@
 //! Links: who lights whom, through which form factor, how visibly. 16 bytes each, sorted by receiver.
 
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// Light passes from `sender` to `receiver`.

@@ -12,9 +12,9 @@ use crate::hooks::{Hierarchy, LightField};
 use crate::links::{Link, Links};
 use crate::sampling::hash;
 use crate::segments::visibility_at;
+use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
 use glam::Vec3;
-use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
 
@@ -120,7 +120,7 @@ impl Push {
             parts.push((leaf, part));
             rest = after;
         }
-        let chunk = if error.is_some() { BETWEEN_WATCHES * rayon::current_num_threads() } else { parts.len().max(1) };
+        let chunk = if error.is_some() { BETWEEN_WATCHES * threads::current_num_threads() } else { parts.len().max(1) };
         for part in parts.chunks_mut(chunk) {
             if error.is_some() && watch().is_break() {
                 return Self::new(light, links, None, room, watch);

@@ -13,9 +13,9 @@ use crate::links::Links;
 use crate::rows::{Correction, Row, look_around};
 use crate::sampling::hash;
 use crate::segments::visibility_at;
+use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -243,7 +243,7 @@ pub(crate) fn reconstruct<L: LightField>(
     let mut vertices = lay_out(light.scene, light.elements);
     let count = vertices.positions.len();
     let mut rays = 0;
-    let chunk = BETWEEN_WATCHES * rayon::current_num_threads();
+    let chunk = BETWEEN_WATCHES * threads::current_num_threads();
     let mut covered = Vec::with_capacity(count);
     for start in (0..count).step_by(chunk) {
         if watch(start as f32 / count as f32).is_break() {

@@ -14,9 +14,9 @@ use crate::oracle::{FactorBounds, factor_bounds};
 use crate::segments;
 use crate::skips::Skips;
 use crate::stats::Skipped;
+use crate::threads::{self, prelude::*};
 use crate::transport::{Exitant, Light};
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -156,7 +156,7 @@ pub(crate) fn refine<L: LightField>(
         let mut growth = Growth::new(reader.elements, refined.links.len() + wave.len());
         while verdicts.len() < wave.len() {
             let first = verdicts.len();
-            let part = &wave[first..wave.len().min(first + BETWEEN_WATCHES * rayon::current_num_threads())];
+            let part = &wave[first..wave.len().min(first + BETWEEN_WATCHES * threads::current_num_threads())];
             refined.stopped = refined.stopped || watch(wave.len() as u64, refined.links.len() as u64).is_break();
             refined.spent = refined.spent.or(account.is_late().then_some(Spent::Time));
             let stopped = refined.stopped || refined.spent.is_some();
@@ -215,7 +215,8 @@ pub(crate) fn refine<L: LightField>(
         wave = next;
     }
     refined.rays = counters.rays.into_inner();
-    refined.visibility_seconds = counters.nanoseconds.into_inner() as f64 * 1e-9 / rayon::current_num_threads() as f64;
+    refined.visibility_seconds =
+        counters.nanoseconds.into_inner() as f64 * 1e-9 / threads::current_num_threads() as f64;
     refined
 }
 

@@ -8,9 +8,9 @@ use crate::hooks::{Arrived, LightField, NodeId};
 use crate::links::Links;
 use crate::sampling::{hash, unit};
 use crate::solver::{Phase, Progress, Solver};
+use crate::threads::{self, prelude::*};
 use crate::{Cone, Rgb};
 use glam::Vec2;
-use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::ControlFlow;
@@ -214,7 +214,7 @@ impl<L: LightField> Solver<L> {
             self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse, spread })
         };
         let mut exitant: Vec<L::Exitant> = Vec::with_capacity(changed.len());
-        for part in changed.chunks(BETWEEN_WATCHES * rayon::current_num_threads()) {
+        for part in changed.chunks(BETWEEN_WATCHES * threads::current_num_threads()) {
             if watch().is_break() {
                 break;
             }
@@ -247,7 +247,7 @@ impl<L: LightField> Solver<L> {
         }
         let progress = self.progress(Phase::Transport, 0.86, 1.0);
         let (mut done, mut stopped) = (0, false);
-        let chunk = BETWEEN_WATCHES * rayon::current_num_threads();
+        let chunk = BETWEEN_WATCHES * threads::current_num_threads();
         self.reflect(&leaves, &mut || {
             let share = (done as f32 / leaves.len() as f32).min(1.0);
             done += chunk;

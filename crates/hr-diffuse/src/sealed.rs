@@ -12,10 +12,10 @@ use crate::geometry::{Aabb, Domain, Geometry};
 use crate::hierarchy::SceneData;
 use crate::sampling::{cosine_direction, hash, point2, point4};
 use crate::segments::light_segment;
+use crate::threads::prelude::*;
 use crate::visibility::{NO_BLOCKER, Region};
 use crate::{Light, Rgb};
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::ops::Range;
 

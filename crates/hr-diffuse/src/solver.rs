@@ -84,6 +84,7 @@ pub enum Phase {
 
 /// How far a solve is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Progress {
     /// What it is doing.
     pub phase: Phase,

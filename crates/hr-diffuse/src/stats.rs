@@ -4,6 +4,7 @@ use crate::budget::Spent;
 
 /// Counts and seconds of a solve.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Stats {
     /// Surfaces handed in.
     pub polygons: u64,
@@ -37,6 +38,7 @@ pub struct Stats {
 
 /// Work avoided.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Skipped {
     /// Pairs whose receiver reflects nothing.
     pub black_receivers: u64,
@@ -68,6 +70,7 @@ impl std::ops::AddAssign for Skipped {
 
 /// Seconds by phase.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Seconds {
     /// Hierarchy and ray tree.
     pub build: f64,

@@ -12,8 +12,8 @@ use crate::geometry::Domain;
 use crate::hierarchy::SceneData;
 use crate::sampling::{cosine_direction, hash, point4};
 use crate::sealed::{Groups, Side, sees_light};
+use crate::threads::prelude::*;
 use crate::{LightKind, Rgb};
-use rayon::prelude::*;
 
 /// Reflectances above this are taken for 1: rounding of what an extension adds.
 const ENTIRE: f32 = 1.0 - 1e-6;

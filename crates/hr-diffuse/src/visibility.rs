@@ -6,12 +6,12 @@
 
 use crate::geometry::{Aabb, Domain, Geometry, Outline};
 use crate::sealed::Side;
+use crate::threads::prelude::*;
 use glam::{Vec2, Vec3, Vec3A, Vec4};
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use obvhs::{Boundable, BvhBuildParams};
-use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::time::Duration;
 

@@ -3,7 +3,7 @@
 use super::half::Half3;
 use super::{Haar, MAX_LEVEL, Node};
 use hr_diffuse::flat::{FlatError, Reader, Writer, fits};
-use rayon::prelude::*;
+use hr_diffuse::threads::prelude::*;
 use std::io;
 
 const WHAT: &str = "directional distributions";

@@ -195,6 +195,7 @@ impl fmt::Display for Faults {
 
 /// What a host that conforms did.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Tally {
     /// Calls of `receive`.
     pub transfers: u64,
