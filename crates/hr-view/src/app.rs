@@ -2,6 +2,7 @@
 
 use crate::ViewError;
 use crate::args::Args;
+use crate::export;
 use crate::glossy::Mode;
 use crate::html;
 use crate::interrupt::Interrupt;
@@ -46,6 +47,7 @@ enum Output {
     Image(PathBuf),
     Frames(PathBuf),
     Html(PathBuf),
+    Export(PathBuf),
 }
 
 impl Output {
@@ -62,6 +64,11 @@ impl Output {
         if let Some(path) = &args.html {
             has_folder(path)?;
             return Ok(Self::Html(path.clone()));
+        }
+        if let Some(path) = &args.export {
+            export::Format::of(path)?;
+            has_folder(path)?;
+            return Ok(Self::Export(path.clone()));
         }
         if let Some(folder) = &args.frames {
             make_folder(folder)?;
@@ -128,6 +135,7 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
         Output::Image(path) => show.image(&path),
         Output::Frames(folder) => show.frames(&folder),
         Output::Html(path) => show.html(&path),
+        Output::Export(path) => show.export(&path),
     }
 }
 
@@ -217,6 +225,12 @@ impl Show<'_> {
     fn html(&self, path: &Path) -> Result<(), ViewError> {
         self.progress.at("writing the page", 0.0);
         html::write(&self.solved, path)?;
+        self.write_stats()
+    }
+
+    fn export(&self, path: &Path) -> Result<(), ViewError> {
+        self.progress.at("writing the solution", 0.0);
+        export::write(&self.solved, path)?;
         self.write_stats()
     }
 

@@ -64,6 +64,10 @@ pub struct Args {
     /// No window: one self-contained file that walks through the solution in any browser
     #[arg(long, value_name = "OUT.html", conflicts_with_all = ["image", "frames"])]
     pub html: Option<PathBuf>,
+
+    /// No window: the solution for other programs; .csv is a table of elements, .glb a glTF model with the light in it
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["image", "frames", "html", "camera", "mode"])]
+    pub export: Option<PathBuf>,
 }
 
 /// What came of reading the command line.
@@ -166,6 +170,7 @@ mod tests {
         assert_eq!(run("--mode gather --image o.exr").mode, Mode::Gather, "stills by a final gather");
         assert_eq!(run("--save s.hrs").save, Some("s.hrs".into()), "save");
         assert_eq!(run("room --load s.hrs --threads 2").load, Some("s.hrs".into()), "load");
+        assert_eq!(run("--export light.glb").export, Some("light.glb".into()), "export");
         assert_eq!(run("--frames out").frames, Some("out".into()), "frames");
     }
 
@@ -192,6 +197,8 @@ mod tests {
             ("--load x --time-budget 3", "--time-budget"),
             ("--html x --mode samples", "leave --mode out"),
             ("--html x --image a.png", "--image"),
+            ("--export x.glb --image a.png", "--image"),
+            ("--export x.glb --mode samples", "--mode"),
         ];
         for (line, hint) in cases {
             let Err(error) = read(line) else { panic!("'{line}' was taken") };

@@ -4,6 +4,7 @@ pub mod app;
 pub mod args;
 pub mod display;
 pub mod error;
+pub mod export;
 pub mod facets;
 pub mod glossy;
 pub mod html;

@@ -20,13 +20,15 @@ fn command(arguments: &[&str]) -> Command {
 
 #[test]
 fn mistakes_are_status_1_and_one_line() {
-    let cases: [(&[&str], &str); 11] = [
+    let cases: [(&[&str], &str); 13] = [
         (&["no-such-scene"], "room"),
         (&["no-such-file.mgf"], "no-such-file.mgf"),
         (&["--camera", "no-such-camera.json"], "no-such-camera.json"),
         (&["--image", "picture.gif"], ".png"),
         (&["--error", "2"], "0.001"),
         (&["furnace", "--html", "no/such/folder/a.html"], "no/such/folder/a.html"),
+        (&["furnace", "--export", "a.obj"], ".glb"),
+        (&["furnace", "--export", "no/such/folder/a.csv"], "no/such/folder/a.csv"),
         (&["--mode", "gather"], "add --image"),
         (&["furnace", "--image", "no/such/folder/a.png"], "no/such/folder/a.png"),
         (&["furnace", "--save", "no/such/folder/a.light"], "no/such/folder/a.light"),
