@@ -2,6 +2,7 @@
 
 mod determinism;
 mod diffuse;
+mod edits;
 mod furnace;
 mod hooks;
 mod invariance;

@@ -62,4 +62,18 @@ pub enum SolveError {
         /// What was asked for.
         error: f32,
     },
+    /// An edit that needs new links.
+    #[error("{what} {index}; make a new solver for the scene as it is now")]
+    Edit {
+        /// What has changed.
+        what: &'static str,
+        /// Index of what has.
+        index: usize,
+    },
+    /// Lamps that cannot be mixed so.
+    #[error("lamps cannot be mixed: {what}")]
+    Mix {
+        /// What is wrong, and what would be right.
+        what: &'static str,
+    },
 }

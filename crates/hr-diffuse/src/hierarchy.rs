@@ -345,6 +345,41 @@ impl Elements {
         cluster
     }
 
+    /// Finds all reflectances anew, those of surfaces from the scene.
+    pub(crate) fn repaint(&mut self, scene: &SceneData, extra: impl Fn(u32) -> Option<Rgb>) {
+        for node in 0..self.nodes.len() {
+            let element = self.nodes[node];
+            if !element.is_patch() {
+                continue;
+            }
+            let reflectance = scene.reflectance(element.source, &element.domain);
+            let parent = &self.nodes[element.parent as usize];
+            let importance = if element.active && node > 0 && parent.is_patch() {
+                parent.importance
+            } else {
+                (reflectance + extra(element.material).unwrap_or(Rgb::ZERO)).max_element()
+            };
+            self.nodes[node] = Element { reflectance, importance, ..element };
+        }
+        for node in (0..self.nodes.len()).rev() {
+            let element = &self.nodes[node];
+            if element.kind != Kind::Cluster {
+                continue;
+            }
+            let (mut reflected, mut importance) = (Rgb::ZERO, 0.0_f32);
+            for child in element.first_child..element.first_child + element.child_count {
+                let child = &self.nodes[child as usize];
+                reflected += child.reflectance * child.area;
+                importance = importance.max(child.importance);
+            }
+            let cluster = &mut self.nodes[node];
+            if cluster.area > 0.0 {
+                cluster.reflectance = reflected / cluster.area;
+            }
+            cluster.importance = importance;
+        }
+    }
+
     /// Splits a leaf patch; its children are appended. Does nothing to a node that has children already or that
     /// cannot be split.
     pub(crate) fn split(&mut self, scene: &SceneData, node: u32) {

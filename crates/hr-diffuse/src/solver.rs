@@ -12,6 +12,7 @@ use crate::hooks::LightField;
 use crate::links::Links;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
+use crate::relight::Linked;
 use crate::skips::Skips;
 use crate::stats::Stats;
 use crate::steady;
@@ -30,6 +31,8 @@ const LINK_SHARE: f32 = 0.07;
 const SMALLEST_SHARE: f32 = 0.008;
 /// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
 const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
+/// Index of the last of them.
+pub(crate) const LAST_PASS: usize = PASSES.len() - 1;
 /// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
 /// diffuse light until it is shown.
 const FAINT_SHARE: f32 = 0.7;
@@ -115,6 +118,10 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) unlit: Vec<Pair>,
     /// What arrives through the links there are.
     gather: Gather,
+    /// Whether it is known for these links as well as it can be.
+    prepared: bool,
+    /// What has links.
+    pub(crate) linked: Linked,
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
     /// diffuse light.
     pub(crate) faint: Vec<Rgb>,
@@ -148,13 +155,7 @@ impl<L: LightField> Solver<L> {
             return Err(SolveError::Error { error: settings.error });
         }
         let scene = scene_data(input)?;
-        let (faint, strong) = (0..scene.materials.len() as u32)
-            .map(|material| match field.active(material) {
-                Some(albedo) if albedo.max_element() <= FAINT_SHARE * settings.error => (albedo, Rgb::ZERO),
-                Some(albedo) => (Rgb::ZERO, albedo),
-                None => (Rgb::ZERO, Rgb::ZERO),
-            })
-            .unzip();
+        let (faint, strong) = sorted(&field, scene.materials.len(), settings.error);
         steady::check(&scene, |material| field.active(material).unwrap_or(Rgb::ZERO))?;
         let elements = Elements::build(&scene, |material| field.active(material), skips);
         let count = elements.nodes.len();
@@ -183,6 +184,8 @@ impl<L: LightField> Solver<L> {
             skips,
             unlit: vec![Pair { receiver: 0, sender: 0 }],
             gather: Gather::default(),
+            prepared: false,
+            linked: Linked::default(),
             faint,
             strong,
             last_reflected: Vec::new(),
@@ -191,6 +194,7 @@ impl<L: LightField> Solver<L> {
             area,
             convergence: Convergence::default(),
         };
+        solver.linked = solver.linked();
         solver.pull();
         solver.stats.skipped.sealed_sides = solver.elements.sealed_sides();
         solver.stats.seconds.build = start.elapsed().as_secs_f64();
@@ -204,35 +208,12 @@ impl<L: LightField> Solver<L> {
         let mut stopped = false;
         for (pass, looseness) in PASSES.iter().enumerate() {
             self.refine(pass, *looseness, &mut stopped, watch);
-            let last = pass + 1 >= PASSES.len();
-            let goal = if last { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
-            let most = if last { MOST_ITERATIONS } else { 3 };
             if stopped {
                 // New elements have their parents' light.
                 break;
             }
-            let account = self.account;
-            let progress = self.progress(Phase::Transport, progress_fraction(pass, 0.8), *looseness);
-            self.prepare(last, &mut || {
-                stopped = stopped || watch(&progress).is_break();
-                if stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            });
-            for iteration in 0..most {
-                let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
-                let progress = self.progress(Phase::Transport, fraction, *looseness);
-                let ask = &mut || {
-                    stopped = stopped || watch(&progress).is_break();
-                    if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-                };
-                let Some(residual) = self.iterate(pass >= FIRST_REFLECTED, ask) else { break };
-                if self.grows() {
-                    self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
-                }
-                let settled = self.remaining(residual) < goal && iteration > 0;
-                if stopped || settled || account.is_over() {
-                    break;
-                }
-            }
+            self.prepare_watched(pass, &mut stopped, watch);
+            self.settle(pass, &mut stopped, watch);
             self.measure();
             if stopped {
                 break;
@@ -248,6 +229,67 @@ impl<L: LightField> Solver<L> {
         self.stats.nodes = self.elements.nodes.len() as u64;
         self.stats.leaves = self.elements.patch_leaves().count() as u64;
         self.stats.links = self.links.all().len() as u64;
+    }
+
+    /// Finds out how the light of the links of a pass reaches leaves.
+    fn prepare_watched(
+        &mut self,
+        pass: usize,
+        stopped: &mut bool,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) {
+        let account = self.account;
+        let progress = self.progress(Phase::Transport, progress_fraction(pass, 0.8), PASSES[pass]);
+        self.prepare(pass == LAST_PASS, &mut || {
+            *stopped = *stopped || watch(&progress).is_break();
+            if *stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+    }
+
+    /// The same where links have changed since, for the last pass.
+    pub(crate) fn prepare_again(&mut self, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        if !self.prepared {
+            self.prepare_watched(LAST_PASS, stopped, watch);
+        }
+    }
+
+    /// Iterates until light has settled, as far as a pass needs it.
+    pub(crate) fn settle(
+        &mut self,
+        pass: usize,
+        stopped: &mut bool,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) {
+        let last = pass == LAST_PASS;
+        let goal = if last { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
+        let account = self.account;
+        for iteration in 0..if last { MOST_ITERATIONS } else { 3 } {
+            let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
+            let progress = self.progress(Phase::Transport, fraction, PASSES[pass]);
+            let ask = &mut || {
+                *stopped = *stopped || watch(&progress).is_break();
+                if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            let Some(residual) = self.iterate(pass >= FIRST_REFLECTED, ask) else { break };
+            if self.grows() {
+                self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
+            }
+            let settled = self.remaining(residual) < goal && iteration > 0;
+            if *stopped || settled || account.is_over() {
+                break;
+            }
+        }
+    }
+
+    /// Begins a new series of iterations: the light is another one.
+    pub(crate) fn restart(&mut self) {
+        self.convergence.restart();
+        self.account = Account::new(self.settings.budget, Instant::now());
+    }
+
+    /// Tells materials whose extension's light travels as diffuse light from the others.
+    pub(crate) fn sort_materials(&mut self) {
+        (self.faint, self.strong) = sorted(&self.field, self.scene.materials.len(), self.settings.error);
     }
 
     /// Takes note of the memory in use.
@@ -294,6 +336,7 @@ impl<L: LightField> Solver<L> {
         self.stats.spent = self.stats.spent.or(refined.spent);
         let count = self.elements.nodes.len();
         self.links = Links::new(refined.links, count);
+        self.prepared = false;
         self.unlit = refined.unlit;
         expose(&self.scene, &mut self.elements);
         self.incident.resize_with(count, L::Incident::default);
@@ -372,6 +415,7 @@ impl<L: LightField> Solver<L> {
         let error = closely.then_some(if self.skips.faint_links { self.settings.error } else { 0.0 });
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
         self.gather = Gather::new(self.light(), &self.links, error, room, watch);
+        self.prepared = closely;
         self.stats.skipped.faint_links = self.gather.faint_links();
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
@@ -392,7 +436,7 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Diffuse radiosity of the leaves, averaged bottom-up with its range and direction.
-    fn pull(&mut self) {
+    pub(crate) fn pull(&mut self) {
         let exitant = &mut self.exitant;
         for node in (0..self.elements.nodes.len()).rev() {
             let element = &self.elements.nodes[node];
@@ -494,6 +538,16 @@ impl<L: LightField> Solver<L> {
     }
 }
 
+/// By material: what is reflected beside the diffuse part, as diffuse and as directional light.
+fn sorted<L: LightField>(field: &L, materials: usize, error: f32) -> (Vec<Rgb>, Vec<Rgb>) {
+    let sort = |material| match field.active(material) {
+        Some(albedo) if albedo.max_element() <= FAINT_SHARE * error => (albedo, Rgb::ZERO),
+        Some(albedo) => (Rgb::ZERO, albedo),
+        None => (Rgb::ZERO, Rgb::ZERO),
+    };
+    (0..materials as u32).map(sort).unzip()
+}
+
 /// Share of the work done: each pass costs a few times the one before.
 fn progress_fraction(pass: usize, within: f32) -> f32 {
     const SHARES: [f32; 5] = [0.0, 0.05, 0.15, 0.4, 0.9];
@@ -501,8 +555,8 @@ fn progress_fraction(pass: usize, within: f32) -> f32 {
     SHARES[pass] + (SHARES[pass + 1] - SHARES[pass]) * within.clamp(0.0, 1.0)
 }
 
-/// Checks a scene and maps it to unit space.
-pub(crate) fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
+/// Checks what can be checked of a scene without its geometry.
+pub(crate) fn check(input: &SceneInput) -> Result<(), SolveError> {
     if input.surfaces.is_empty() {
         return Err(SolveError::Empty);
     }
@@ -530,6 +584,12 @@ pub(crate) fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
             return Err(SolveError::Light { light, what });
         }
     }
+    Ok(())
+}
+
+/// Checks a scene and maps it to unit space.
+pub(crate) fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
+    check(input)?;
     let normalization = Normalization::new(&input.surfaces);
     let surfaces = input
         .surfaces
@@ -539,6 +599,24 @@ pub(crate) fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
             Geometry::from_surface(s, &normalization).map_err(|source| SolveError::Surface { surface, source })
         })
         .collect::<Result<Vec<_>, _>>()?;
+    let lights = unit_lights(input, &normalization)?;
+    let surface_materials: Vec<u32> = input.surfaces.iter().map(|s| s.material).collect();
+    let twins = twins(&surfaces, &surface_materials);
+    Ok(SceneData {
+        visibility: Visibility::with_twins(&surfaces, &twins),
+        surface_materials,
+        twins,
+        shading_normals: input.surfaces.iter().map(|s| s.shading_normals).collect(),
+        materials: input.materials.clone(),
+        lights,
+        light_positions: input.lights.iter().map(|l| normalization.to_unit(l.position)).collect(),
+        texture: input.texture.clone(),
+        normalization,
+    })
+}
+
+/// Lights without extent in unit space, which their positions are not mapped to.
+pub(crate) fn unit_lights(input: &SceneInput, normalization: &Normalization) -> Result<Vec<crate::Light>, SolveError> {
     let scale2 = (normalization.scale() * normalization.scale()) as f32;
     for (light, l) in input.lights.iter().enumerate() {
         // Far outside of the scene f32 ends: its square, which the inverse square law needs, must exist.
@@ -558,17 +636,5 @@ pub(crate) fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
     if let Some(light) = lights.iter().position(|l| l.intensity.max_element() > MOST_LIGHT) {
         return Err(SolveError::Light { light, what: "it is too strong for the size of the scene" });
     }
-    let surface_materials: Vec<u32> = input.surfaces.iter().map(|s| s.material).collect();
-    let twins = twins(&surfaces, &surface_materials);
-    Ok(SceneData {
-        visibility: Visibility::with_twins(&surfaces, &twins),
-        surface_materials,
-        twins,
-        shading_normals: input.surfaces.iter().map(|s| s.shading_normals).collect(),
-        materials: input.materials.clone(),
-        lights,
-        light_positions: input.lights.iter().map(|l| normalization.to_unit(l.position)).collect(),
-        texture: input.texture.clone(),
-        normalization,
-    })
+    Ok(lights)
 }
