@@ -10,7 +10,7 @@
 use crate::error::SolveError;
 use crate::hierarchy::Elements;
 use crate::hooks::LightField;
-use crate::solver::{LAST_PASS, Progress, Solver, check, unit_lights};
+use crate::solver::{FIRST_REFLECTED, LAST_PASS, Progress, Solver, check, unit_lights};
 use crate::transport::Exitant;
 use crate::{Light, LightKind, Rgb, SceneInput};
 use std::ops::ControlFlow;
@@ -63,6 +63,12 @@ impl<L: LightField> Solver<L> {
     #[must_use]
     pub fn elements(&self) -> &Elements {
         &self.elements
+    }
+
+    /// The extension.
+    #[must_use]
+    pub fn field(&self) -> &L {
+        &self.field
     }
 
     /// The light as it is now, by node.
@@ -236,6 +242,10 @@ impl<L: LightField> Solver<L> {
             self.prepare_again(&mut stopped, watch);
             self.stats.residuals.clear();
             self.restart();
+            if self.elements.nodes[0].active {
+                // Light is reflected by the extension when most of it is there: that is what takes time.
+                self.settle(FIRST_REFLECTED - 1, &mut stopped, watch);
+            }
             self.settle(LAST_PASS, &mut stopped, watch);
         }
         self.stats.stopped = stopped;

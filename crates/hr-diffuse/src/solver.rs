@@ -39,7 +39,7 @@ const FAINT_SHARE: f32 = 0.7;
 /// Iterations end when all that are to come would change the solution by less than this share of the error.
 const CONVERGED_SHARE: f32 = 0.02;
 /// The first pass that reflects the extension's light: before it, there is little light to reflect.
-const FIRST_REFLECTED: usize = 2;
+pub(crate) const FIRST_REFLECTED: usize = 2;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
 
