@@ -10,9 +10,11 @@ use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::links::{Link, Links};
 use crate::reconstruct::{Corner, Vertices};
+use crate::refine::Pair;
 use crate::reflect::Senders;
+use crate::resume::Unfinished;
 use crate::solution::Solution;
-use crate::solver::scene_data;
+use crate::solver::{PASSES, scene_data};
 use crate::stats::{Seconds, Skipped, Stats};
 use crate::transport::Exitant;
 use crate::{Rgb, SceneInput, SolveError};
@@ -71,6 +73,7 @@ impl<L: Keep> Solution<L> {
         out.put(self.links.all())?;
         self.vertices.store(out)?;
         out.put(&self.faint)?;
+        self.unfinished.store(out)?;
         self.field.store(&self.incident, &self.reflected, out)
     }
 
@@ -90,10 +93,11 @@ impl<L: Keep> Solution<L> {
         let vertices = Vertices::restore(&elements, from)?;
         let faint: Vec<Rgb> = from.take_finite("faint materials")?;
         fits(faint.len() == scene.materials.len(), "faint materials")?;
+        let unfinished = Unfinished::restore(count, from)?;
         let (incident, reflected) = field.restore(count, from)?;
         fits(incident.len() == count && reflected.len() == count, "extension's light")?;
         stats.seconds.build = start.elapsed().as_secs_f64();
-        Ok(Self { scene, elements, exitant, links, vertices, field, incident, reflected, faint, stats })
+        Ok(Self { scene, elements, exitant, links, vertices, field, incident, reflected, faint, stats, unfinished })
     }
 }
 
@@ -235,6 +239,25 @@ fn restore_links(nodes: usize, from: &mut Reader<'_>) -> Result<Links, FlatError
     };
     fits(links.iter().all(is_sound), "links")?;
     Ok(Links::new(links, nodes))
+}
+
+impl Unfinished {
+    fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+        out.put(&[self.passes])?;
+        out.put(&[self.error])?;
+        out.put(&self.unlit)?;
+        out.put(&self.coarse)
+    }
+
+    fn restore(nodes: usize, from: &mut Reader<'_>) -> Result<Self, FlatError> {
+        const WHAT: &str = "pairs that are not done";
+        let ([passes], [error]) = (from.take_exactly(WHAT)?, from.take_exactly(WHAT)?);
+        let unfinished = Self { passes, error, unlit: from.take(WHAT)?, coarse: from.take(WHAT)? };
+        let is_sound = |pair: &Pair| (pair.receiver as usize) < nodes && (pair.sender as usize) < nodes;
+        let pairs = unfinished.unlit.iter().chain(&unfinished.coarse).all(is_sound);
+        fits(pairs && passes as usize <= PASSES.len() && (0.001..=1.0).contains(&error), WHAT)?;
+        Ok(unfinished)
+    }
 }
 
 impl Vertices {

@@ -54,7 +54,8 @@ const PROBES: u32 = 64;
 const UNSEEN: f32 = 3.0 / PROBES as f32;
 
 /// A link to be, between two nodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub(crate) struct Pair {
     pub(crate) receiver: u32,
     pub(crate) sender: u32,
@@ -79,6 +80,8 @@ enum Verdict {
     Facing,
     Unlit,
     Keep(Link),
+    /// Keep the link of a larger pair, for want of time.
+    Inherit(Link),
     SplitReceiver,
     SplitSender,
     SplitBoth,
@@ -101,6 +104,8 @@ impl Verdict {
 pub(crate) struct Refined {
     pub(crate) links: Vec<Link>,
     pub(crate) unlit: Vec<Pair>,
+    /// Pairs whose link is that of a larger one.
+    pub(crate) coarse: Vec<Pair>,
     pub(crate) skipped: Skipped,
     pub(crate) pairs: u64,
     pub(crate) rays: u64,
@@ -163,7 +168,8 @@ pub(crate) fn refine<L: LightField>(
             let decided = part.par_iter().with_min_len(32).map(|candidate| {
                 let inherited = if stopped { inherited(reader, candidate) } else { None };
                 let decided = || decide(reader, candidate.pair, candidate.own(), tolerance, stopped, &counters);
-                inherited.map_or_else(decided, Verdict::Keep)
+                let keep = |link| if candidate.own().is_some() { Verdict::Keep(link) } else { Verdict::Inherit(link) };
+                inherited.map_or_else(decided, keep)
             });
             verdicts.par_extend(decided);
             // Pair by pair: where memory ends does not depend on the number of threads.
@@ -191,7 +197,10 @@ pub(crate) fn refine<L: LightField>(
                     refined.skipped.unlit_senders += 1;
                     refined.unlit.push(*pair);
                 }
-                Verdict::Keep(link) => {
+                Verdict::Keep(link) | Verdict::Inherit(link) => {
+                    if matches!(verdict, Verdict::Inherit(_)) {
+                        refined.coarse.push(*pair);
+                    }
                     refined.skipped.proved_free += u64::from(link.visibility < 0.0);
                     refined.links.push(*link);
                 }

@@ -4,6 +4,7 @@ use crate::hierarchy::{Elements, SceneData};
 use crate::hooks::{LightField, NodeId};
 use crate::links::Links;
 use crate::reconstruct::{Vertices, reconstruct};
+use crate::resume::Unfinished;
 use crate::solver::{Phase, Progress, Solver};
 use crate::stats::Stats;
 use crate::transport::{Exitant, Light};
@@ -35,6 +36,8 @@ pub struct Solution<L: LightField = ()> {
     pub faint: Vec<Rgb>,
     /// Work done and avoided.
     pub stats: Stats,
+    /// What is left to be done.
+    pub(crate) unfinished: Unfinished,
 }
 
 impl<L: LightField> Solver<L> {
@@ -65,6 +68,7 @@ impl<L: LightField> Solver<L> {
             reflected: self.reflected,
             faint: self.faint,
             stats: self.stats,
+            unfinished: self.unfinished,
         }
     }
 }

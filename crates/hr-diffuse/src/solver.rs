@@ -13,6 +13,7 @@ use crate::links::Links;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
 use crate::relight::Linked;
+use crate::resume::Unfinished;
 use crate::skips::Skips;
 use crate::stats::Stats;
 use crate::steady;
@@ -30,7 +31,7 @@ const LINK_SHARE: f32 = 0.07;
 /// Elements are not split below this share of the error's square root: features smaller than that are not resolved.
 const SMALLEST_SHARE: f32 = 0.008;
 /// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
-const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
+pub(crate) const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
 /// Index of the last of them.
 pub(crate) const LAST_PASS: usize = PASSES.len() - 1;
 /// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
@@ -64,6 +65,12 @@ impl Settings {
     #[must_use]
     pub fn with_error(error: f32) -> Self {
         Self { error, budget: Budget::default() }
+    }
+
+    /// Whether they can be met.
+    pub(crate) fn check(&self) -> Result<(), SolveError> {
+        let error = self.error;
+        if (0.001..=1.0).contains(&error) { Ok(()) } else { Err(SolveError::Error { error }) }
     }
 }
 
@@ -115,7 +122,8 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) stats: Stats,
     account: Account,
     pub(crate) skips: Skips,
-    pub(crate) unlit: Vec<Pair>,
+    /// What is left to be done.
+    pub(crate) unfinished: Unfinished,
     /// What arrives through the links there are.
     gather: Gather,
     /// Whether it is known for these links as well as it can be.
@@ -151,38 +159,58 @@ impl<L: LightField> Solver<L> {
     /// [`new`](Self::new) with a say in what is skipped.
     pub(crate) fn skipping(input: &SceneInput, settings: Settings, field: L, skips: Skips) -> Result<Self, SolveError> {
         let start = Instant::now();
-        if !(0.001..=1.0).contains(&settings.error) {
-            return Err(SolveError::Error { error: settings.error });
-        }
+        settings.check()?;
         let scene = scene_data(input)?;
-        let (faint, strong) = sorted(&field, scene.materials.len(), settings.error);
         steady::check(&scene, |material| field.active(material).unwrap_or(Rgb::ZERO))?;
         let elements = Elements::build(&scene, |material| field.active(material), skips);
         let count = elements.nodes.len();
+        let exitant = Exitant {
+            radiosity: vec![Rgb::ZERO; count],
+            range: vec![[Rgb::ZERO; 2]; count],
+            facing: vec![Facing::ZERO; count],
+            irradiance: vec![Rgb::ZERO; count],
+            directional: vec![Rgb::ZERO; count],
+            reflected_as: (0..count as u32).collect(),
+            peak: vec![0.0; count],
+            gain: vec![1.0; count],
+            senders: Senders::default(),
+        };
+        let incident = std::iter::repeat_with(L::Incident::default).take(count).collect();
+        let reflected = std::iter::repeat_with(L::Exitant::default).take(count).collect();
+        let solver = Self::with_light(scene, elements, exitant, (field, incident, reflected), settings);
+        let mut solver = Self { skips, account: Account::new(settings.budget, start), ..solver };
+        solver.unfinished =
+            Unfinished { error: settings.error, unlit: vec![Pair { receiver: 0, sender: 0 }], ..Unfinished::default() };
+        solver.stats.polygons = input.surfaces.len() as u64;
+        solver.pull();
+        solver.stats.skipped.sealed_sides = solver.elements.sealed_sides();
+        solver.stats.seconds.build = start.elapsed().as_secs_f64();
+        Ok(solver)
+    }
+
+    /// A solver without links, with what light there is.
+    pub(crate) fn with_light(
+        scene: SceneData,
+        elements: Elements,
+        exitant: Exitant,
+        (field, incident, reflected): (L, Vec<L::Incident>, Vec<L::Exitant>),
+        settings: Settings,
+    ) -> Self {
+        let (faint, strong) = sorted(&field, scene.materials.len(), settings.error);
         let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
         let mut solver = Self {
             scene,
             elements,
-            exitant: Exitant {
-                radiosity: vec![Rgb::ZERO; count],
-                range: vec![[Rgb::ZERO; 2]; count],
-                facing: vec![Facing::ZERO; count],
-                irradiance: vec![Rgb::ZERO; count],
-                directional: vec![Rgb::ZERO; count],
-                reflected_as: (0..count as u32).collect(),
-                peak: vec![0.0; count],
-                gain: vec![1.0; count],
-                senders: Senders::default(),
-            },
+            exitant,
             links: Links::default(),
             field,
-            incident: std::iter::repeat_with(L::Incident::default).take(count).collect(),
-            reflected: std::iter::repeat_with(L::Exitant::default).take(count).collect(),
+            incident,
+            reflected,
             settings,
-            stats: Stats { polygons: input.surfaces.len() as u64, ..Stats::default() },
-            account: Account::new(settings.budget, start),
-            skips,
-            unlit: vec![Pair { receiver: 0, sender: 0 }],
+            stats: Stats::default(),
+            account: Account::new(settings.budget, Instant::now()),
+            skips: Skips::ALL,
+            unfinished: Unfinished::default(),
             gather: Gather::default(),
             prepared: false,
             linked: Linked::default(),
@@ -195,10 +223,7 @@ impl<L: LightField> Solver<L> {
             convergence: Convergence::default(),
         };
         solver.linked = solver.linked();
-        solver.pull();
-        solver.stats.skipped.sealed_sides = solver.elements.sealed_sides();
-        solver.stats.seconds.build = start.elapsed().as_secs_f64();
-        Ok(solver)
+        solver
     }
 
     /// Solves. `watch` is told how far it is every few milliseconds, and may break: then the solution is what there is by
@@ -206,7 +231,8 @@ impl<L: LightField> Solver<L> {
     /// [`Stats::spent`] tells which one it was.
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
-        for (pass, looseness) in PASSES.iter().enumerate() {
+        self.unfinished.renew(&mut self.links, self.elements.nodes.len());
+        for (pass, looseness) in PASSES.iter().enumerate().skip(self.unfinished.passes as usize) {
             self.refine(pass, *looseness, &mut stopped, watch);
             if stopped {
                 // New elements have their parents' light.
@@ -217,6 +243,9 @@ impl<L: LightField> Solver<L> {
             self.measure();
             if stopped {
                 break;
+            }
+            if self.stats.spent.is_none() {
+                self.unfinished.passes = pass as u32 + 1;
             }
         }
         if self.stats.iterations == 0 {
@@ -316,7 +345,7 @@ impl<L: LightField> Solver<L> {
         };
         let error = self.believed_error(looseness);
         self.convergence.restart();
-        let (links, unlit) = (self.links.take(), std::mem::take(&mut self.unlit));
+        let (links, unlit) = (self.links.take(), std::mem::take(&mut self.unfinished.unlit));
         let nodes = self.elements.nodes.len() as u64;
         let mut light = MutableLight {
             scene: &self.scene,
@@ -337,7 +366,8 @@ impl<L: LightField> Solver<L> {
         let count = self.elements.nodes.len();
         self.links = Links::new(refined.links, count);
         self.prepared = false;
-        self.unlit = refined.unlit;
+        self.unfinished.unlit = refined.unlit;
+        self.unfinished.coarse.extend(refined.coarse);
         expose(&self.scene, &mut self.elements);
         self.incident.resize_with(count, L::Incident::default);
         self.stats.skipped += refined.skipped;

@@ -121,7 +121,8 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
             // The window shows mirrors by their distributions in any mode; what is kept is for every mode.
             let mirrors = scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
             let shown = args.mode == Mode::Distributions || mirrors && matches!(output, Output::Window);
-            solve(scene, args, shown || args.save.is_some(), &progress)?
+            let begun = args.resume.as_deref().map(|path| solution_file::load(path, Arc::clone(&scene))).transpose()?;
+            solve(scene, begun, args, shown || args.save.is_some(), &progress)?
         }
     };
     if let Some(path) = &args.save {
@@ -160,17 +161,18 @@ fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
     Ok(Arc::new(scene))
 }
 
-/// Solves for the light to the accuracy asked for, or until the time is up or the user has seen enough. Also tells
+/// Solves for the light, or goes on with what was begun, to the accuracy asked for, or until the time is up or the user has seen enough. Also tells
 /// how exact the solution is.
 fn solve(
     scene: Arc<Scene>,
+    begun: Option<(Solved, Accuracy)>,
     args: &Args,
     distributions: bool,
     progress: &Progress,
 ) -> Result<(Solved, Accuracy), ViewError> {
     let budget = args.time_budget.map(Duration::from_secs_f64);
     let interrupt = Interrupt::listen();
-    let (mut error, mut stopped) = (1.0, false);
+    let (mut error, mut stopped) = (begun.as_ref().map_or(1.0, |(_, accuracy)| accuracy.believed), false);
     // When values at vertices have to be done, after a solve that was stopped.
     let mut latest = None;
     let patient = |from: Duration| from.mul_f64(1.0 + PATIENCE) + Duration::from_secs(1);
@@ -192,7 +194,10 @@ fn solve(
     };
     let time = budget.map(|budget| budget.saturating_sub(progress.elapsed()));
     let settings = Settings { error: args.error, budget: Budget { time, ..Budget::default() } };
-    let solved = Solved::new(scene, settings, distributions, watch)?;
+    let solved = match begun {
+        Some((solved, _)) => solved.resume(settings, distributions, watch)?,
+        None => Solved::new(scene, settings, distributions, watch)?,
+    };
     Ok((solved, Accuracy { asked: args.error, believed: error }))
 }
 

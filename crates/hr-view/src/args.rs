@@ -61,6 +61,10 @@ pub struct Args {
     #[arg(long, value_name = "IN", conflicts_with_all = ["save", "error", "time_budget"])]
     pub load: Option<PathBuf>,
 
+    /// Go on with a solution of this SCENE that --save kept, stopped ones too, to the accuracy asked for
+    #[arg(long, value_name = "IN", conflicts_with = "load")]
+    pub resume: Option<PathBuf>,
+
     /// No window: one self-contained file that walks through the solution in any browser
     #[arg(long, value_name = "OUT.html", conflicts_with_all = ["image", "frames"])]
     pub html: Option<PathBuf>,
@@ -195,6 +199,7 @@ mod tests {
             ("--load x --save y", "--save"),
             ("--load x --error 0.1", "--error"),
             ("--load x --time-budget 3", "--time-budget"),
+            ("--load x --resume y", "--resume"),
             ("--html x --mode samples", "leave --mode out"),
             ("--html x --image a.png", "--image"),
             ("--export x.glb --image a.png", "--image"),

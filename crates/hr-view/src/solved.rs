@@ -30,12 +30,35 @@ impl Solved {
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, SolveError> {
         let field = GlossyField::new(&scene.reflectors(), Refinement::default());
-        let mut solver = Solver::new(&scene.input(), settings, field)?;
+        let solver = Solver::new(&scene.input(), settings, field)?;
+        Ok(Self::by(scene, solver, distributions, watch))
+    }
+
+    /// Goes on with what was solved before, to an error that may be smaller; the rest as for [`new`](Self::new).
+    ///
+    /// # Errors
+    /// Where the error is out of range.
+    pub fn resume(
+        self,
+        settings: Settings,
+        distributions: bool,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Self, SolveError> {
+        let solver = Solver::resume(self.solution, settings)?;
+        Ok(Self::by(self.scene, solver, distributions, watch))
+    }
+
+    fn by(
+        scene: Arc<Scene>,
+        mut solver: Solver<GlossyField>,
+        distributions: bool,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Self {
         solver.solve(watch);
         if distributions {
             solver.reflect_for_display(watch);
         }
         let solution = solver.finish(watch);
-        Ok(Self { scene, solution })
+        Self { scene, solution }
     }
 }

@@ -283,3 +283,17 @@ fn ctrl_c_between_frames_ends_at_once_and_leaves_whole_files() {
         image::open(folder.path("frames") + "/" + name).expect("a whole PNG file");
     }
 }
+
+#[test]
+fn what_was_stopped_goes_on() {
+    let folder = Folder::new("resume");
+    let [begun, whole, there, here] = ["begun.light", "whole.light", "there.csv", "here.csv"].map(|n| folder.path(n));
+    // Out of time before it began.
+    succeeds(&["cornell", "--time-budget", "0", "--error", "0.1", "--save", &begun, "--export", &here]);
+    let coarse = std::fs::read_to_string(&here).expect("a table").lines().count();
+    succeeds(&["cornell", "--resume", &begun, "--error", "0.1", "--save", &whole, "--export", &there]);
+    succeeds(&["cornell", "--error", "0.1", "--export", &here]);
+    let [resumed, fresh] = [&there, &here].map(|path| std::fs::read_to_string(path).expect("a table").lines().count());
+    assert!(10 * coarse < 9 * fresh, "{coarse} elements when it was stopped, {fresh} at the end");
+    assert!(10 * resumed > 9 * fresh && 9 * resumed < 10 * fresh, "{resumed} elements, {fresh} without the stop");
+}

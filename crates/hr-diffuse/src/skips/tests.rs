@@ -89,9 +89,9 @@ fn black_receivers_change_nothing() {
 #[test]
 fn senders_that_stay_dark_change_nothing() {
     let [mut with, mut without] = [(); 2].map(|()| solve(&room(), 0.1, (), Skips::ALL));
-    assert!(with.stats.skipped.unlit_senders > 100 && !with.unlit.is_empty(), "{:?}", with.stats.skipped);
+    assert!(with.stats.skipped.unlit_senders > 100 && !with.unfinished.unlit.is_empty(), "{:?}", with.stats.skipped);
     let link = |pair: &Pair| Link { receiver: pair.receiver, sender: pair.sender, factor: 1.0, visibility: 1.0 };
-    let links = without.links.all().iter().copied().chain(without.unlit.iter().map(link)).collect();
+    let links = without.links.all().iter().copied().chain(without.unfinished.unlit.iter().map(link)).collect();
     without.links = Links::new(links, without.elements.nodes.len());
     for solver in [&mut with, &mut without] {
         solver.prepare(true, &mut || ControlFlow::Continue(()));
