@@ -513,7 +513,9 @@ impl<L: LightField> Solver<L> {
                 exitant.directional[node] = directional / area;
                 exitant.range[node] = [low, high];
             }
-            exitant.facing[node] = if weight > 0.0 { facing.scaled(weight.recip()) } else { element.facing };
+            // Next to no light, of which the reciprocal is infinite, is like none.
+            let scale = weight.recip();
+            exitant.facing[node] = if scale.is_finite() { facing.scaled(scale) } else { element.facing };
         }
     }
 

@@ -173,3 +173,18 @@ fn before_and_after_a_stop_edits_are_safe() {
     relight(&mut solver, &room()).expect("links serve for it");
     assert!(walls(&solver).iter().all(|light| light.is_finite() && light.min_element() > 0.0), "there is light");
 }
+
+/// Reciprocals of so little power are infinite.
+#[test]
+fn next_to_no_light_is_finite() {
+    let (mut solver, _) = solved(&room());
+    let mut edited = room();
+    for material in &mut edited.materials {
+        material.exitance *= 1e-41;
+    }
+    edited.lights[0].intensity *= 1e-41;
+    relight(&mut solver, &edited).expect("links serve for it");
+    let light = solver.exitant();
+    let is_finite = |light: &[Rgb]| light.iter().all(|light| light.is_finite());
+    assert!(is_finite(&light.irradiance) && is_finite(&light.radiosity), "light where there is next to none");
+}
