@@ -16,9 +16,16 @@
 //! let lobe = |d: Vec3| Vec3::splat(d.dot(axis).max(0.0).powi(200));
 //! let peaks = [Peak { direction: axis, width: 0.1 }];
 //! let made = Haar::project(&Refinement::default(), &Known { peaks: &peaks, ..Known::NOTHING }, lobe);
-//! assert!((made.haar.eval(axis).x - 1.0).abs() < 0.05);
-//! assert!(made.haar.eval(-axis).x < 1e-3);
+//! assert!((made.distribution.eval(axis).x - 1.0).abs() < 0.05);
+//! assert!(made.distribution.eval(-axis).x < 1e-3);
 //! ```
+//!
+//! # Triangles
+//! A direction d is parametrised by the point p = d / (|x| + |y| + |z|) of the octahedron's surface. Triangles are
+//! subdivided at the midpoints of that *flat* surface: corners are dyadic fractions, exact in `f32`; finding the
+//! triangle of a direction takes only doublings of barycentric coordinates; and the solid angles of the triangles
+//! of one level differ by no more than the Jacobian 1/(√3 |p|³), a factor of 5.2 between a corner of the octahedron
+//! and the middle of a face.
 //!
 //! # Layout
 //! A *basis function* is one undivided triangle ([`Haar::basis_functions`]). At rest a distribution is an array of
@@ -36,23 +43,23 @@
 //! or finer in parts). Refinement stops there, coarse levels first, and says so ([`Projected::truncated`]).
 
 mod combine;
-mod half;
 mod keep;
 mod mesh;
 mod outline;
 mod project;
 #[cfg(test)]
 mod tests;
-mod triangle;
 
+pub use crate::basis::{Beyond, Known, Peak, Projected, Support};
 pub use outline::Outline;
-pub use project::{Beyond, Known, Peak, Projected, Refinement, Refiner, Support};
+pub use project::{Refinement, Refiner};
 
 use crate::Rgb;
+use crate::basis::Basis;
+use crate::basis::half::{Half3, decode, encode, scale_for};
+use crate::basis::triangle::{ConeTest, Overlap, Triangle, child_corners, midpoints};
 use glam::{DVec3, Vec3};
-use half::{Half3, decode, encode, scale_for};
 use hr_diffuse::Cone;
-use triangle::{ConeTest, Overlap, Triangle, child_corners, face_corners, midpoints};
 
 /// Deepest level of subdivision: triangles 0.02° across. Positions stay exact and barycentric coordinates, which
 /// lose a bit per level, keep more than what half floats can show.
@@ -116,6 +123,12 @@ impl Node {
         let base = (self.0 >> 45) as usize & 0x7fff;
         Some(base + (COUNTS >> (2 * before) & 3))
     }
+}
+
+/// Face of the octahedron by its signs (bit 0: x < 0, bit 1: y < 0, bit 2: z < 0) → its corners.
+fn face_corners(face: usize) -> [Vec3; 3] {
+    let sign = |axis: usize| if face >> axis & 1 == 1 { -1.0 } else { 1.0 };
+    [Vec3::X * sign(0), Vec3::Y * sign(1), Vec3::Z * sign(2)]
 }
 
 /// A triangle on the way down the tree.
@@ -390,6 +403,55 @@ impl Haar {
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of::<Self>() + size_of_val(&*self.vertices) + size_of_val(&*self.nodes)
+    }
+}
+
+impl Basis for Haar {
+    type Settings = Refinement;
+
+    fn project(settings: &Refinement, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected<Self> {
+        Self::project(settings, known, f)
+    }
+
+    #[inline]
+    fn eval(&self, direction: Vec3) -> Rgb {
+        self.eval(direction)
+    }
+
+    fn add(&self, other: &Self) -> Self {
+        self.add(other)
+    }
+
+    fn scale(&mut self, factor: f32) {
+        self.scale(factor);
+    }
+
+    fn average(distributions: &[(f32, &Self)], settings: &Refinement, offset: Rgb) -> Self {
+        Self::average(distributions, settings, offset)
+    }
+
+    fn bounds(&self, cone: &Cone) -> (Rgb, Rgb) {
+        self.bounds(cone)
+    }
+
+    fn integral(&self) -> Rgb {
+        self.integral()
+    }
+
+    fn cosine_integral(&self, normal: Vec3) -> Rgb {
+        self.cosine_integral(normal)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.is_empty()
+    }
+
+    fn basis_functions(&self) -> usize {
+        self.basis_functions()
+    }
+
+    fn bytes(&self) -> usize {
+        self.bytes()
     }
 }
 

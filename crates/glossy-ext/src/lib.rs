@@ -2,6 +2,7 @@
 //! reflectors, after Stamminger et al., "Efficient Glossy Global Illumination with Interactive Viewing", Computer
 //! Graphics Forum 19(1), 2000. It plugs into an engine through the hooks of `hr-diffuse` only.
 
+pub mod basis;
 pub mod conformance;
 pub mod field;
 pub mod haar;
@@ -9,7 +10,8 @@ mod keep;
 pub mod reflector;
 pub mod samples;
 
-pub use field::GlossyField;
+pub use basis::Basis;
+pub use field::{GlossyField, Reflection};
 pub use hr_diffuse::Rgb;
 pub use reflector::{
     Compensated, Incident, Lambert, Lobe, MerlError, MetallicRoughness, Phong, Reflector, ReflectorError, Sample, Sum,

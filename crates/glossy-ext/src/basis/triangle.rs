@@ -1,44 +1,32 @@
-//! Geometry of the triangles of the octahedron.
-//!
-//! A direction d is parametrised by the point p = d / (|x| + |y| + |z|) of the octahedron's surface. Triangles are
-//! subdivided at the midpoints of that *flat* surface: corners are dyadic fractions, exact in `f32`; finding the
-//! triangle of a direction takes only doublings of barycentric coordinates; and the solid angles of the triangles
-//! of one level differ by no more than the Jacobian 1/(√3 |p|³), a factor of 5.2 between a corner of the octahedron
-//! and the middle of a face.
+//! Flat triangles as seen from the origin: how they lie to cones of directions, and integrals over them.
 
 use glam::{DVec3, Vec3};
 use hr_diffuse::Cone;
 
 /// Which of (corner 0, 1, 2, midpoint of the edge opposite corner 0, 1, 2) are the corners of each child: three at
 /// the corners of the parent, then the one in the middle.
-pub(super) const CHILD_CORNERS: [[usize; 3]; 4] = [[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]];
+pub(crate) const CHILD_CORNERS: [[usize; 3]; 4] = [[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]];
 
 /// The two ends of the edge opposite each corner.
-pub(super) const EDGE_ENDS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+pub(crate) const EDGE_ENDS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 
 /// Picks the corners of a child from corners and midpoints, whatever is kept there.
 #[inline]
-pub(super) fn child_corners<T: Copy>(corners: [T; 3], mids: [T; 3], child: usize) -> [T; 3] {
+pub(crate) fn child_corners<T: Copy>(corners: [T; 3], mids: [T; 3], child: usize) -> [T; 3] {
     let all = [corners[0], corners[1], corners[2], mids[0], mids[1], mids[2]];
     CHILD_CORNERS[child].map(|i| all[i])
 }
 
 /// Midpoints of the edges opposite each corner.
 #[inline]
-pub(super) fn midpoints(corners: [Vec3; 3]) -> [Vec3; 3] {
+pub(crate) fn midpoints(corners: [Vec3; 3]) -> [Vec3; 3] {
     let [a, b, c] = [0.5 * corners[0], 0.5 * corners[1], 0.5 * corners[2]];
     [b + c, c + a, a + b]
 }
 
-/// Face of the octahedron by its signs (bit 0: x < 0, bit 1: y < 0, bit 2: z < 0) → its corners.
-pub(super) fn face_corners(face: usize) -> [Vec3; 3] {
-    let sign = |axis: usize| if face >> axis & 1 == 1 { -1.0 } else { 1.0 };
-    [Vec3::X * sign(0), Vec3::Y * sign(1), Vec3::Z * sign(2)]
-}
-
 /// A cone of directions made ready for many tests.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ConeTest {
+pub(crate) struct ConeTest {
     axis: Vec3,
     cos: f32,
     sin: f32,
@@ -48,7 +36,7 @@ impl ConeTest {
     /// Rounding of the dot and cross products of unit vectors in `f32`, several times over; tests err toward "touches".
     const SLACK: f32 = 1e-6;
 
-    pub(super) fn new(cone: &Cone) -> Self {
+    pub(crate) fn new(cone: &Cone) -> Self {
         let cos = cone.cos_angle.clamp(-1.0, 1.0);
         Self { axis: cone.axis, cos, sin: (1.0 - cos * cos).max(0.0).sqrt() }
     }
@@ -56,7 +44,7 @@ impl ConeTest {
 
 /// How a triangle lies to a cone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Overlap {
+pub(crate) enum Overlap {
     /// No direction in common.
     Apart,
     /// Perhaps some.
@@ -65,45 +53,45 @@ pub(super) enum Overlap {
     Inside,
 }
 
-/// A triangle on the octahedron's surface.
+/// A flat triangle; the directions through it are a spherical one.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Triangle {
-    /// Corners on the octahedron (|x| + |y| + |z| = 1), not normalised.
-    pub(super) corners: [Vec3; 3],
+pub(crate) struct Triangle {
+    /// Corners, of any length.
+    pub(crate) corners: [Vec3; 3],
     /// Unit direction through the centroid.
     center: Vec3,
 }
 
 impl Triangle {
     #[inline]
-    pub(super) fn new(corners: [Vec3; 3]) -> Self {
+    pub(crate) fn new(corners: [Vec3; 3]) -> Self {
         Self { corners, center: (corners[0] + corners[1] + corners[2]).normalize() }
     }
 
     #[inline]
-    pub(super) fn child(&self, child: usize) -> Self {
+    pub(crate) fn child(&self, child: usize) -> Self {
         Self::new(child_corners(self.corners, midpoints(self.corners), child))
     }
 
     #[inline]
-    pub(super) fn center(&self) -> Vec3 {
+    pub(crate) fn center(&self) -> Vec3 {
         self.center
     }
 
     /// Cosine of the angle from the middle to the farthest corner.
     #[inline]
-    pub(super) fn cos_radius(&self) -> f32 {
+    pub(crate) fn cos_radius(&self) -> f32 {
         let cos = |c: Vec3| self.center.dot(c) / c.length();
         cos(self.corners[0]).min(cos(self.corners[1])).min(cos(self.corners[2])).min(1.0)
     }
 
     /// Whether a cone and this triangle may have a direction in common. Never wrongly false.
-    pub(super) fn touches(&self, cone: &ConeTest) -> bool {
+    pub(crate) fn touches(&self, cone: &ConeTest) -> bool {
         self.overlap(cone) != Overlap::Apart
     }
 
     /// Never wrongly apart nor inside.
-    pub(super) fn overlap(&self, cone: &ConeTest) -> Overlap {
+    pub(crate) fn overlap(&self, cone: &ConeTest) -> Overlap {
         let between = self.center.dot(cone.axis);
         let cos = self.cos_radius();
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
@@ -131,9 +119,10 @@ impl Triangle {
     }
 
     /// ∫ weight(direction) · (linear interpolation of `values`) dω over the triangle and ∫ weight dω, by quadrature
-    /// on each of 4^`splits` parts: Radon's seven points, fewer for small triangles. The solid angle of an area dA
-    /// of a face, at distance 1/√3 from the origin, is dω = dA / (√3 |p|³).
-    pub(super) fn integrate(&self, values: [DVec3; 3], splits: u32, weight: &impl Fn(Vec3) -> f32) -> (DVec3, f64) {
+    /// on each of 4^`splits` parts: Radon's seven points, fewer for small triangles. Of an area dA at the point p, on a
+    /// plane at the distance h from the origin, the solid angle is dω = h dA / |p|³; h times the area of the triangle is
+    /// half of its corners' triple product.
+    pub(crate) fn integrate(&self, values: [DVec3; 3], splits: u32, weight: &impl Fn(Vec3) -> f32) -> (DVec3, f64) {
         if splits > 0 {
             let mids = EDGE_ENDS.map(|[a, b]| 0.5 * (values[a] + values[b]));
             return (0..4).fold((DVec3::ZERO, 0.0), |(sum, total), i| {
@@ -142,14 +131,14 @@ impl Triangle {
             });
         }
         let [a, b, c] = self.corners;
-        let area = 0.5 * f64::from((b - a).cross(c - a).length());
+        let area = 0.5 * f64::from((b - a).cross(c - a).dot(a).abs());
         let (mut sum, mut total) = (DVec3::ZERO, 0.0);
         // Small triangles take the three midpoints of their edges, degree 2.
         let rule: &[_] = if self.cos_radius() > 0.998 { &MIDPOINTS } else { &RADON };
         for &(l, w) in rule {
             let p = a * l[0] as f32 + b * l[1] as f32 + c * l[2] as f32;
             let length = p.length();
-            let jacobian = area * w / (3.0_f64.sqrt() * f64::from(length * length * length));
+            let jacobian = area * w / f64::from(length * length * length);
             let density = jacobian * f64::from(weight(p / length));
             sum += density * (values[0] * l[0] + values[1] * l[1] + values[2] * l[2]);
             total += density;
@@ -158,10 +147,10 @@ impl Triangle {
     }
 
     /// Solid angle in steradians to first order: the Jacobian in the middle. For weighting neighbours only.
-    pub(super) fn rough_solid_angle(&self) -> f32 {
+    pub(crate) fn rough_solid_angle(&self) -> f32 {
         let [a, b, c] = self.corners;
         let p = (a + b + c) / 3.0;
-        0.5 * (b - a).cross(c - a).length() / (3.0_f32.sqrt() * p.length().powi(3))
+        0.5 * (b - a).cross(c - a).dot(a).abs() / p.length().powi(3)
     }
 }
 
