@@ -179,6 +179,27 @@ impl<B: Basis> GlossyField<B> {
         Some(Reflection { material, place, incident, flat, least })
     }
 
+    /// Represents what a leaf reflects in the basis.
+    #[must_use]
+    pub fn project(&self, reflection: &Reflection<'_>) -> B {
+        let known = Known {
+            support: Some(reflection.support()),
+            offset: -reflection.least,
+            peaks: &peaks(reflection.material, &reflection.incident, &reflection.place),
+        };
+        let mut overruled = 0;
+        let projected = B::project(&self.settings, &known, |direction| {
+            let (light, is_clamped) = reflection.clamped(direction);
+            overruled += u64::from(is_clamped);
+            light
+        });
+        let count = reflection.incident.len() as u64;
+        self.counters.evaluations.fetch_add(projected.evaluations as u64 * count, Ordering::Relaxed);
+        self.counters.samples.fetch_add(count, Ordering::Relaxed);
+        self.counters.clamped.fetch_add(overruled + projected.not_finite as u64, Ordering::Relaxed);
+        projected.distribution
+    }
+
     /// The reflector of a material that takes part.
     #[must_use]
     pub fn reflector(&self, material: u32) -> Option<&Arc<dyn Reflector>> {
@@ -273,6 +294,16 @@ impl Reflection<'_> {
         (if self.flat { radiance } else { radiance * outgoing.z.max(0.0) }, is_clamped)
     }
 
+    /// Scales a distribution down to what the leaf can reflect of an irradiance: a projection that overestimates a narrow
+    /// lobe would let mirrors facing each other shine without end.
+    pub fn conserve<B: Basis>(&self, exitant: &mut B, irradiance: Rgb) {
+        let power = if self.flat { exitant.cosine_integral(self.place.normal()) } else { exitant.integral() };
+        let (power, most) = (power.element_sum(), MOST_GAIN * (self.material.albedo * irradiance).element_sum());
+        if power > most {
+            exitant.scale(most / power);
+        }
+    }
+
     /// Where it is not zero.
     fn support(&self) -> Support {
         Support {
@@ -308,30 +339,8 @@ impl<B: Basis> LightField for GlossyField<B> {
 
     fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], arrived: Arrived) -> B {
         let Some(reflection) = self.reflection(hierarchy, leaf, path, arrived) else { return B::default() };
-        let known = Known {
-            support: Some(reflection.support()),
-            offset: arrived.diffuse,
-            peaks: &peaks(reflection.material, &reflection.incident, &reflection.place),
-        };
-        let mut overruled = 0;
-        let projected = B::project(&self.settings, &known, |direction| {
-            let (light, is_clamped) = reflection.clamped(direction);
-            overruled += u64::from(is_clamped);
-            light
-        });
-        let count = reflection.incident.len() as u64;
-        self.counters.evaluations.fetch_add(projected.evaluations as u64 * count, Ordering::Relaxed);
-        self.counters.samples.fetch_add(count, Ordering::Relaxed);
-        self.counters.clamped.fetch_add(overruled + projected.not_finite as u64, Ordering::Relaxed);
-        let mut exitant = projected.distribution;
-        // A projection that overestimates a narrow lobe would let mirrors facing each other shine without end.
-        let power =
-            if reflection.flat { exitant.cosine_integral(reflection.place.normal()) } else { exitant.integral() };
-        let (power, most) =
-            (power.element_sum(), MOST_GAIN * (reflection.material.albedo * arrived.irradiance).element_sum());
-        if power > most {
-            exitant.scale(most / power);
-        }
+        let mut exitant = self.project(&reflection);
+        reflection.conserve(&mut exitant, arrived.irradiance);
         exitant
     }
 
