@@ -57,7 +57,7 @@ pub use project::{Refinement, Refiner};
 use crate::Rgb;
 use crate::basis::Basis;
 use crate::basis::half::{Half3, decode, encode, scale_for};
-use crate::basis::triangle::{ConeTest, Overlap, Triangle, child_corners, midpoints};
+use crate::basis::triangle::{ConeTest, Overlap, PIECE_SPLITS, Triangle, child_corners, midpoints};
 use glam::{DVec3, Vec3};
 use hr_diffuse::Cone;
 
@@ -220,9 +220,13 @@ impl Haar {
                 false
             }
         };
-        self.pieces(enter, &mut |triangle, values| {
-            bound_piece(triangle, values, cone, &test, PIECE_SPLITS, &mut low, &mut high);
-        });
+        let piece = &mut |triangle: &Triangle, values: [Rgb; 3]| {
+            triangle.bound(values, &test, PIECE_SPLITS, &mut low, &mut high);
+        };
+        match self.smallest_around(&test) {
+            Some(visit) => self.pieces_below(&visit, enter, piece),
+            None => self.pieces(enter, piece),
+        }
         (low, high) = (low.min(low_inside), high.max(high_inside));
         if low.cmpgt(high).any() {
             // No cone at all: one of its numbers is not a number.
@@ -231,6 +235,33 @@ impl Haar {
         // Rounding in the interpolation, a few units in the last place of the largest value involved.
         let slack = low.abs().max(high.abs()) * (4.0 * f32::EPSILON);
         ((low - slack) * self.scale, (high + slack) * self.scale)
+    }
+
+    /// The smallest triangle that holds a whole cone, if any does: bounds over narrow cones start there.
+    fn smallest_around(&self, cone: &ConeTest) -> Option<Visit> {
+        let axis = cone.axis();
+        let face = axis.cmplt(Vec3::ZERO).bitmask() as usize;
+        let mut around = Visit {
+            triangle: Triangle::new(face_corners(face)),
+            vertices: Self::face_vertices(face),
+            node: self.root(face),
+            level: 0,
+        };
+        if !around.triangle.holds(cone) {
+            return None;
+        }
+        let size = axis.abs();
+        let mut at = size / size.element_sum();
+        while let Some(node) = around.node.map(|n| self.nodes[n]).filter(|n| n.is_divided()) {
+            let child = descend(&mut at).index();
+            let triangle = around.triangle.child(child);
+            if !triangle.holds(cone) {
+                break;
+            }
+            let vertices = child_corners(around.vertices, node.mids(), child);
+            around = Visit { triangle, vertices, node: node.child(child), level: around.level + 1 };
+        }
+        Some(around)
     }
 
     /// ∫ over the sphere, per steradian of the quantity: of intensity (W/sr), the power (W).
@@ -505,33 +536,4 @@ fn descend(at: &mut Vec3) -> Which {
 #[inline]
 fn interpolate(at: Vec3, a: Rgb, b: Rgb, c: Rgb) -> Rgb {
     (at.x * a + at.y * b + at.z * c) / (at.x + at.y + at.z)
-}
-
-/// How often [`Haar::bounds`] divides a linear piece that is much larger than the cone.
-const PIECE_SPLITS: u32 = 6;
-
-/// Extends bounds by a linear piece, by its parts that the cone touches where it is larger than the cone.
-fn bound_piece(
-    triangle: &Triangle,
-    values: [Rgb; 3],
-    cone: &Cone,
-    test: &ConeTest,
-    splits: u32,
-    low: &mut Rgb,
-    high: &mut Rgb,
-) {
-    let (min, max) = (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]));
-    if min.cmpge(*low).all() && max.cmple(*high).all() || !triangle.touches(test) {
-        return;
-    }
-    if splits == 0 || triangle.cos_radius() >= cone.cos_angle {
-        *low = low.min(min);
-        *high = high.max(max);
-        return;
-    }
-    let mids = midpoints(values);
-    for child in 0..4 {
-        let part = child_corners(values, mids, child);
-        bound_piece(&triangle.child(child), part, cone, test, splits - 1, low, high);
-    }
 }

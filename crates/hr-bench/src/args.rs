@@ -219,6 +219,10 @@ pub struct PaperArgs {
     #[arg(value_name = "SCENE")]
     pub scenes: Vec<String>,
 
+    /// Error to ask for in tables 3 and 4
+    #[arg(long, value_name = "E", default_value_t = 0.05)]
+    pub error: f32,
+
     /// Where paper-tables.md and its pictures go
     #[arg(long, value_name = "DIR", default_value = "target/hr-bench")]
     pub out: PathBuf,

@@ -6,7 +6,7 @@
 //! and shared; a distribution is nothing but the values.
 
 use super::half::{Half3, decode, encode, scale_for};
-use super::triangle::{ConeTest, Overlap, Triangle, child_corners};
+use super::triangle::{ConeTest, Overlap, PIECE_SPLITS, Triangle, child_corners};
 use super::{Basis, Known, Projected, Sampler};
 use crate::Rgb;
 use glam::{DVec3, Vec3};
@@ -159,9 +159,8 @@ impl NonAdaptive {
                 self.bound(mesh, 4 + 4 * index + child, test, range);
             }
         } else {
-            for value in self.corner_values(mesh.corners[index]) {
-                *range = (range.0.min(value), range.1.max(value));
-            }
+            let values = self.corner_values(mesh.corners[index]);
+            mesh.triangle(index).bound(values, test, PIECE_SPLITS, &mut range.0, &mut range.1);
         }
     }
 }

@@ -24,6 +24,9 @@ pub(crate) fn midpoints(corners: [Vec3; 3]) -> [Vec3; 3] {
     [b + c, c + a, a + b]
 }
 
+/// How often bounds divide a linear piece that is much larger than the cone.
+pub(crate) const PIECE_SPLITS: u32 = 6;
+
 /// A cone of directions made ready for many tests.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ConeTest {
@@ -39,6 +42,10 @@ impl ConeTest {
     pub(crate) fn new(cone: &Cone) -> Self {
         let cos = cone.cos_angle.clamp(-1.0, 1.0);
         Self { axis: cone.axis, cos, sin: (1.0 - cos * cos).max(0.0).sqrt() }
+    }
+
+    pub(crate) fn axis(&self) -> Vec3 {
+        self.axis
     }
 }
 
@@ -58,14 +65,12 @@ pub(crate) enum Overlap {
 pub(crate) struct Triangle {
     /// Corners, of any length.
     pub(crate) corners: [Vec3; 3],
-    /// Unit direction through the centroid.
-    center: Vec3,
 }
 
 impl Triangle {
     #[inline]
     pub(crate) fn new(corners: [Vec3; 3]) -> Self {
-        Self { corners, center: (corners[0] + corners[1] + corners[2]).normalize() }
+        Self { corners }
     }
 
     #[inline]
@@ -73,15 +78,17 @@ impl Triangle {
         Self::new(child_corners(self.corners, midpoints(self.corners), child))
     }
 
+    /// Unit direction through the centroid.
     #[inline]
     pub(crate) fn center(&self) -> Vec3 {
-        self.center
+        (self.corners[0] + self.corners[1] + self.corners[2]).normalize()
     }
 
     /// Cosine of the angle from the middle to the farthest corner.
     #[inline]
     pub(crate) fn cos_radius(&self) -> f32 {
-        let cos = |c: Vec3| self.center.dot(c) / c.length();
+        let center = self.center();
+        let cos = |c: Vec3| center.dot(c) / c.length();
         cos(self.corners[0]).min(cos(self.corners[1])).min(cos(self.corners[2])).min(1.0)
     }
 
@@ -92,7 +99,17 @@ impl Triangle {
 
     /// Never wrongly apart nor inside.
     pub(crate) fn overlap(&self, cone: &ConeTest) -> Overlap {
-        let between = self.center.dot(cone.axis);
+        // Most triangles are beyond the great circle of an edge: no root is needed to see that. A cone wider than a
+        // hemisphere reaches across every one.
+        if cone.cos > 0.0
+            && self.depths(cone.axis).iter().any(|(depth, length2)| {
+                let beyond = (-depth - ConeTest::SLACK).max(0.0);
+                beyond * beyond > cone.sin * cone.sin * length2
+            })
+        {
+            return Overlap::Apart;
+        }
+        let between = self.center().dot(cone.axis);
         let cos = self.cos_radius();
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
         // Inside: angle(axis, center) ≤ cone's angle − radius, in cosines.
@@ -100,22 +117,50 @@ impl Triangle {
             return Overlap::Inside;
         }
         // Touching the circle around the triangle: angle(axis, center) ≤ cone's angle + radius.
-        if cone.cos <= -cos {
-            return Overlap::Partial;
-        }
-        if between < cone.cos * cos - cone.sin * sin - ConeTest::SLACK {
+        if cone.cos > -cos && between < cone.cos * cos - cone.sin * sin - ConeTest::SLACK {
             return Overlap::Apart;
         }
-        // The edges' great circles; a cone wider than a hemisphere reaches across every one.
-        if cone.cos <= 0.0 {
-            return Overlap::Partial;
+        Overlap::Partial
+    }
+
+    /// Extends bounds by those of a linear interpolation over the triangle, by its parts that the cone touches where it
+    /// is larger than the cone; it is divided `splits` times at most.
+    pub(crate) fn bound(&self, values: [Vec3; 3], cone: &ConeTest, splits: u32, low: &mut Vec3, high: &mut Vec3) {
+        let (min, max) = (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]));
+        if min.cmpge(*low).all() && max.cmple(*high).all() || self.overlap(cone) == Overlap::Apart {
+            return;
         }
-        let reaches = |&[a, b]: &[usize; 2]| {
-            let normal = self.corners[a].cross(self.corners[b]);
-            let inward = if normal.dot(self.center) < 0.0 { -normal } else { normal };
-            inward.dot(cone.axis) >= -cone.sin * normal.length() - ConeTest::SLACK
-        };
-        if EDGE_ENDS.iter().all(reaches) { Overlap::Partial } else { Overlap::Apart }
+        if splits == 0 || self.cos_radius() >= cone.cos {
+            *low = low.min(min);
+            *high = high.max(max);
+            return;
+        }
+        let mids = midpoints(values);
+        for child in 0..4 {
+            let part = child_corners(values, mids, child);
+            self.child(child).bound(part, cone, splits - 1, low, high);
+        }
+    }
+
+    /// Whether a cone narrower than a hemisphere is inside the triangle. Never wrongly true.
+    pub(crate) fn holds(&self, cone: &ConeTest) -> bool {
+        self.depths(cone.axis).iter().all(|(depth, length2)| {
+            let within = depth - ConeTest::SLACK;
+            cone.cos > 0.0 && within > 0.0 && within * within > cone.sin * cone.sin * length2
+        })
+    }
+
+    /// Of each edge: how far a direction is on the inner side of the plane through it and the origin, as the product
+    /// with a normal of that plane, and that normal's squared length.
+    #[inline]
+    fn depths(&self, direction: Vec3) -> [(f32, f32); 3] {
+        let [a, b, c] = self.corners;
+        // Counterclockwise or clockwise, as seen from the origin.
+        let turn = (b - a).cross(c - a).dot(a).signum();
+        EDGE_ENDS.map(|[i, j]| {
+            let normal = self.corners[i].cross(self.corners[j]);
+            (turn * normal.dot(direction), normal.length_squared())
+        })
     }
 
     /// ∫ weight(direction) · (linear interpolation of `values`) dω over the triangle and ∫ weight dω, by quadrature

@@ -2,6 +2,7 @@
 
 use crate::BenchError;
 use crate::measure::cpu_seconds;
+use glam::{Vec2, Vec3};
 use glossy_ext::haar::Refinement;
 use glossy_ext::samples::SampleSet;
 use glossy_ext::{GlossyField, Reflection, Reflector};
@@ -63,14 +64,14 @@ pub(super) fn reflect<L: LightField<Incident = SampleSet>>(
 
 /// Mean distance of what leaves send from what they reflect, relative to its mean, weighted by the cosine.
 pub(super) fn distance(
-    field: &GlossyField,
     solution: &Solution<GlossyField>,
     leaves: &[Leaf<'_>],
-    sent: impl Fn(usize, glam::Vec3) -> Rgb,
+    sent: impl Fn(usize, Vec3) -> Rgb,
 ) -> f64 {
     let (mut off, mut total) = (0.0, 0.0);
     for (index, leaf) in leaves.iter().enumerate() {
-        let Some(reflection) = field.reflection(&solution.elements, leaf.node, &leaf.path, leaf.arrived) else {
+        let Some(reflection) = solution.field.reflection(&solution.elements, leaf.node, &leaf.path, leaf.arrived)
+        else {
             continue;
         };
         for (direction, cosine) in hemisphere(&reflection) {
@@ -86,12 +87,12 @@ pub(super) fn distance(
 const DIRECTIONS: usize = 3000;
 
 /// Directions spread evenly over the hemisphere above a leaf, and their cosines.
-fn hemisphere(reflection: &Reflection<'_>) -> impl Iterator<Item = (glam::Vec3, f32)> {
+fn hemisphere(reflection: &Reflection<'_>) -> impl Iterator<Item = (Vec3, f32)> {
     let frame = reflection.place().frame;
     (0..DIRECTIONS).map(move |i| {
         // Points of a spiral: the golden angle apart, evenly in height.
         let z = (i as f32 + 0.5) / DIRECTIONS as f32;
-        let turn = glam::Vec2::from_angle(i as f32 * 2.399_963_2) * (1.0 - z * z).sqrt();
+        let turn = Vec2::from_angle(i as f32 * 2.399_963_2) * (1.0 - z * z).sqrt();
         (frame * turn.extend(z), z)
     })
 }
