@@ -4,7 +4,7 @@ use crate::Rgb;
 use crate::basis::{Basis, Beyond, Known, Peak, Support};
 use crate::haar::{Haar, Refinement};
 use crate::reflector::{Incident, Reflector, Ward};
-use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_weak};
+use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_close, merge_weak};
 use glam::Vec3;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
 use std::f32::consts::FRAC_PI_2;
@@ -163,9 +163,13 @@ impl<B: Basis> GlossyField<B> {
             return None;
         }
         balance(&mut incident, arrived.irradiance);
+        let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
+        // A lobe that is not round is narrower one way; a mirror shows everything.
+        if material.mirror.is_none() && material.reflector.grain().is_none() {
+            merge_close(&mut incident, width);
+        }
         merge_weak(&mut incident);
         // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
-        let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
         // Normals that turn by an angle turn what is reflected by twice as much.
         let narrowest = (2.0 * arrived.spread).clamp(NARROWEST, FRAC_PI_2);
         for sample in &mut incident {

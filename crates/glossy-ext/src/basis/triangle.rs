@@ -87,7 +87,11 @@ impl Triangle {
     /// Cosine of the angle from the middle to the farthest corner.
     #[inline]
     pub(crate) fn cos_radius(&self) -> f32 {
-        let center = self.center();
+        self.cos_radius_about(self.center())
+    }
+
+    #[inline]
+    fn cos_radius_about(&self, center: Vec3) -> f32 {
         let cos = |c: Vec3| center.dot(c) / c.length();
         cos(self.corners[0]).min(cos(self.corners[1])).min(cos(self.corners[2])).min(1.0)
     }
@@ -109,8 +113,9 @@ impl Triangle {
         {
             return Overlap::Apart;
         }
-        let between = self.center().dot(cone.axis);
-        let cos = self.cos_radius();
+        let center = self.center();
+        let between = center.dot(cone.axis);
+        let cos = self.cos_radius_about(center);
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
         // Inside: angle(axis, center) ≤ cone's angle − radius, in cosines.
         if cone.cos < cos - ConeTest::SLACK && between > cone.cos * cos + cone.sin * sin + ConeTest::SLACK {

@@ -11,6 +11,7 @@ use glossy_ext::{Basis, GlossyField, Reflector};
 use hr_diffuse::{Settings, Solution, Solver};
 use hr_scene::{Camera, Image, Scene};
 use hr_view::Mode;
+use hr_view::path_tracer::{self, PathTracer};
 use hr_view::raycast::RayCaster;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -23,8 +24,12 @@ const ERROR: f32 = 0.1;
 const LEVELS: [u8; 4] = [3, 4, 5, 6];
 /// ε and last level of our refiner, ever finer: at each level the ε beyond which a smaller one brings little.
 const FINER: [(f32, u8); 7] = [(0.2, 3), (0.2, 4), (0.2, 5), (0.1, 6), (0.05, 5), (0.02, 5), (0.02, 6)];
+/// Error that the solver is asked for to show the solution.
+const SHOWN_ERROR: f32 = 0.05;
+/// Paths per pixel of the reference.
+const PATHS: u32 = 100;
 /// Width of the pictures, pixels.
-const WIDTH: u32 = 240;
+const WIDTH: u32 = 200;
 
 /// What a basis does with the leaves of a solution.
 #[derive(Clone, Copy, Debug)]
@@ -134,11 +139,14 @@ pub(super) fn report(page: &mut Page<'_>) -> Result<(), BenchError> {
             part(|m| m.seconds),
         ]);
     }
-    page.text("Above non-adaptive, in the middle Haar by the paper's refiner, left down to level 3, right to level 4; below the reflected samples:");
+    page.text(&format!(
+        "Above non-adaptive, in the middle Haar by the paper's refiner, left to level 3, right to level 4; below left Haar by \
+         our refiner, as `hr-view` uses it, right a path tracer's picture ({PATHS} paths per pixel):"
+    ));
     let pictures = [
         vec![shown::<NonAdaptive>(&scene, Level(3))?, shown::<NonAdaptive>(&scene, Level(4))?],
         vec![shown::<Haar>(&scene, relative(0.5, [1, 3]))?, shown::<Haar>(&scene, relative(0.5, [1, 4]))?],
-        vec![render(&scene, &solution, Mode::Samples)?],
+        vec![shown::<Haar>(&scene, Refinement::default())?, reference(&scene)?],
     ];
     page.picture("figure-7", "The glossy floor in both bases", &side_by_side(&pictures))
 }
@@ -146,18 +154,24 @@ pub(super) fn report(page: &mut Page<'_>) -> Result<(), BenchError> {
 /// A picture of the scene by its distributions in some basis.
 fn shown<B: Basis>(scene: &Arc<Scene>, settings: B::Settings) -> Result<Image, BenchError> {
     let field = GlossyField::<B>::in_basis(&scene.reflectors(), settings);
-    let mut solver = Solver::new(&scene.input(), Settings::with_error(ERROR), field)?;
+    let mut solver = Solver::new(&scene.input(), Settings::with_error(SHOWN_ERROR), field)?;
     let going_on = |_: &_| ControlFlow::Continue(());
     solver.solve(&mut { going_on });
     solver.reflect_for_display(&mut { going_on });
-    render(scene, &solver.finish(&mut { going_on }), Mode::Distributions)
+    let solution = solver.finish(&mut { going_on });
+    Ok(RayCaster::new(scene, &solution, Mode::Distributions).with_grid(2).render(&view(scene)?, &|_| ()))
 }
 
-fn render<B: Basis>(scene: &Scene, solution: &Solution<GlossyField<B>>, mode: Mode) -> Result<Image, BenchError> {
+/// The same by path tracing.
+fn reference(scene: &Scene) -> Result<Image, BenchError> {
+    let visibility = path_tracer::visibility(scene)?;
+    Ok(PathTracer::new(scene, &visibility).render(&view(scene)?, PATHS, 0, &|_| ()).image)
+}
+
+fn view(scene: &Scene) -> Result<Camera, BenchError> {
     let camera = camera(scene, Some("corner"))?;
     let height = f64::from(camera.height) * f64::from(WIDTH) / f64::from(camera.width);
-    let camera = Camera { width: WIDTH, height: height.round() as u32, ..camera };
-    Ok(RayCaster::new(scene, solution, mode).with_grid(2).render(&camera, &|_| ()))
+    Ok(Camera { width: WIDTH, height: height.round() as u32, ..camera })
 }
 
 #[cfg(test)]
