@@ -322,9 +322,9 @@ impl Haar {
         };
         let node = self.nodes[index];
         if node.is_divided() {
-            for child in 0..4 {
+            for (child, triangle) in visit.triangle.children().into_iter().enumerate() {
                 let below = Visit {
-                    triangle: visit.triangle.child(child),
+                    triangle,
                     vertices: child_corners(visit.vertices, node.mids(), child),
                     node: node.child(child),
                     level: visit.level + 1,
@@ -334,8 +334,8 @@ impl Haar {
         } else {
             let corners = values();
             let mids = self.mid_values(corners, node);
-            for child in 0..4 {
-                piece(&visit.triangle.child(child), child_corners(corners, mids, child));
+            for (child, triangle) in visit.triangle.children().iter().enumerate() {
+                piece(triangle, child_corners(corners, mids, child));
             }
         }
     }

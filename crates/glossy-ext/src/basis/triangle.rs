@@ -14,7 +14,8 @@ pub(crate) const EDGE_ENDS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 #[inline]
 pub(crate) fn child_corners<T: Copy>(corners: [T; 3], mids: [T; 3], child: usize) -> [T; 3] {
     let all = [corners[0], corners[1], corners[2], mids[0], mids[1], mids[2]];
-    CHILD_CORNERS[child].map(|i| all[i])
+    let [i, j, k] = CHILD_CORNERS[child];
+    [all[i], all[j], all[k]]
 }
 
 /// Midpoints of the edges opposite each corner.
@@ -65,17 +66,28 @@ pub(crate) enum Overlap {
 pub(crate) struct Triangle {
     /// Corners, of any length.
     pub(crate) corners: [Vec3; 3],
+    /// 1 where they are counterclockwise as seen from outside, −1 where they are clockwise.
+    turn: f32,
 }
 
 impl Triangle {
     #[inline]
     pub(crate) fn new(corners: [Vec3; 3]) -> Self {
-        Self { corners }
+        let [a, b, c] = corners;
+        Self { corners, turn: (b - a).cross(c - a).dot(a).signum() }
     }
 
     #[inline]
     pub(crate) fn child(&self, child: usize) -> Self {
-        Self::new(child_corners(self.corners, midpoints(self.corners), child))
+        Self { corners: child_corners(self.corners, midpoints(self.corners), child), ..*self }
+    }
+
+    /// All four parts, in the order of [`CHILD_CORNERS`].
+    #[inline]
+    pub(crate) fn children(&self) -> [Self; 4] {
+        let mids = midpoints(self.corners);
+        let child = |child| Self { corners: child_corners(self.corners, mids, child), ..*self };
+        [child(0), child(1), child(2), child(3)]
     }
 
     /// Unit direction through the centroid.
@@ -84,16 +96,13 @@ impl Triangle {
         (self.corners[0] + self.corners[1] + self.corners[2]).normalize()
     }
 
-    /// Cosine of the angle from the middle to the farthest corner.
+    /// Cosine of the angle from the middle to the farthest corner, which is less than 90° away.
     #[inline]
     pub(crate) fn cos_radius(&self) -> f32 {
-        self.cos_radius_about(self.center())
-    }
-
-    #[inline]
-    fn cos_radius_about(&self, center: Vec3) -> f32 {
-        let cos = |c: Vec3| center.dot(c) / c.length();
-        cos(self.corners[0]).min(cos(self.corners[1])).min(cos(self.corners[2])).min(1.0)
+        let [a, b, c] = self.corners;
+        let middle = a + b + c;
+        let squared = |corner: Vec3| middle.dot(corner).powi(2) / corner.length_squared();
+        (squared(a).min(squared(b)).min(squared(c)) / middle.length_squared()).sqrt().min(1.0)
     }
 
     /// Whether a cone and this triangle may have a direction in common. Never wrongly false.
@@ -105,17 +114,16 @@ impl Triangle {
     pub(crate) fn overlap(&self, cone: &ConeTest) -> Overlap {
         // Most triangles are beyond the great circle of an edge: no root is needed to see that. A cone wider than a
         // hemisphere reaches across every one.
-        if cone.cos > 0.0
-            && self.depths(cone.axis).iter().any(|(depth, length2)| {
-                let beyond = (-depth - ConeTest::SLACK).max(0.0);
-                beyond * beyond > cone.sin * cone.sin * length2
-            })
-        {
+        let beyond = |edge: usize| {
+            let (depth, length2) = self.depth(edge, cone.axis);
+            let beyond = (-depth - ConeTest::SLACK).max(0.0);
+            beyond * beyond > cone.sin * cone.sin * length2
+        };
+        if cone.cos > 0.0 && (beyond(0) || beyond(1) || beyond(2)) {
             return Overlap::Apart;
         }
-        let center = self.center();
-        let between = center.dot(cone.axis);
-        let cos = self.cos_radius_about(center);
+        let between = self.center().dot(cone.axis);
+        let cos = self.cos_radius();
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
         // Inside: angle(axis, center) ≤ cone's angle − radius, in cosines.
         if cone.cos < cos - ConeTest::SLACK && between > cone.cos * cos + cone.sin * sin + ConeTest::SLACK {
@@ -141,31 +149,28 @@ impl Triangle {
             return;
         }
         let mids = midpoints(values);
-        for child in 0..4 {
-            let part = child_corners(values, mids, child);
-            self.child(child).bound(part, cone, splits - 1, low, high);
+        for (child, triangle) in self.children().iter().enumerate() {
+            triangle.bound(child_corners(values, mids, child), cone, splits - 1, low, high);
         }
     }
 
     /// Whether a cone narrower than a hemisphere is inside the triangle. Never wrongly true.
     pub(crate) fn holds(&self, cone: &ConeTest) -> bool {
-        self.depths(cone.axis).iter().all(|(depth, length2)| {
+        let within = |edge: usize| {
+            let (depth, length2) = self.depth(edge, cone.axis);
             let within = depth - ConeTest::SLACK;
-            cone.cos > 0.0 && within > 0.0 && within * within > cone.sin * cone.sin * length2
-        })
+            within > 0.0 && within * within > cone.sin * cone.sin * length2
+        };
+        cone.cos > 0.0 && within(0) && within(1) && within(2)
     }
 
-    /// Of each edge: how far a direction is on the inner side of the plane through it and the origin, as the product
-    /// with a normal of that plane, and that normal's squared length.
+    /// How far a direction is on the inner side of the plane through an edge and the origin, as the product with a
+    /// normal of that plane, and that normal's squared length.
     #[inline]
-    fn depths(&self, direction: Vec3) -> [(f32, f32); 3] {
-        let [a, b, c] = self.corners;
-        // Counterclockwise or clockwise, as seen from the origin.
-        let turn = (b - a).cross(c - a).dot(a).signum();
-        EDGE_ENDS.map(|[i, j]| {
-            let normal = self.corners[i].cross(self.corners[j]);
-            (turn * normal.dot(direction), normal.length_squared())
-        })
+    fn depth(&self, edge: usize, direction: Vec3) -> (f32, f32) {
+        let [from, to] = EDGE_ENDS[edge];
+        let normal = self.corners[from].cross(self.corners[to]);
+        (self.turn * normal.dot(direction), normal.length_squared())
     }
 
     /// ∫ weight(direction) · (linear interpolation of `values`) dω over the triangle and ∫ weight dω, by quadrature
