@@ -24,6 +24,9 @@ fn relative(epsilon: f32, [min_level, max_level]: [u8; 2]) -> Refinement {
     Refinement { min_level, max_level, refiner: Refiner::Relative(epsilon), ..Refinement::PAPER }
 }
 
+/// Paragraphs are wrapped at so many characters.
+const WRAP: usize = 120;
+
 /// A text that grows, and the folder where pictures go.
 struct Page<'a> {
     text: String,
@@ -41,7 +44,17 @@ impl Page<'_> {
         if !self.text.is_empty() {
             self.text.push('\n');
         }
-        self.line(text);
+        let mut width = 0;
+        for word in text.split_whitespace() {
+            let length = word.chars().count();
+            if width > 0 {
+                self.text.push(if width + length < WRAP { ' ' } else { '\n' });
+                width = if width + length < WRAP { width + 1 } else { 0 };
+            }
+            self.text += word;
+            width += length;
+        }
+        self.text.push('\n');
     }
 
     /// Adds the head of a table; columns after the first `left` ones are numbers.
@@ -90,19 +103,22 @@ pub fn report(args: &PaperArgs, out: Out<'_>) -> Result<(), BenchError> {
 
 fn introduce(page: &mut Page<'_>, args: &PaperArgs) {
     let name = |scene: &String| Path::new(scene).file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let words = ["hr-bench paper --out docs".to_owned()].into_iter().chain(args.scenes.iter().map(name));
+    let words =
+        [format!("hr-bench paper --error {} --out docs", args.error)].into_iter().chain(args.scenes.iter().map(name));
     let command = words.collect::<Vec<_>>().join(" ");
+    page.text("# The paper's tables");
     page.text(&format!(
-        "# The paper's tables\n\n\
-         Made by `{command}`. The paper is Stamminger, Scheel, Granier, Perez-Cazorla, Drettakis and Sillion, \"Efficient \
+        "Made by `{command}`. The paper is Stamminger, Scheel, Granier, Perez-Cazorla, Drettakis and Sillion, \"Efficient \
          Glossy Global Illumination with Interactive Viewing\", Computer Graphics Forum 19(1), 2000; its figures are those \
-         of its tables 1 to 4, measured on a 195 MHz R10000.\n\n\
-         Scenes are ours, made after the descriptions, so counts and times compare by their ratios only. Times are \
+         of its tables 1 to 4, measured on a 195 MHz R10000.",
+    ));
+    page.text(
+        "Scenes are ours, made after the descriptions, so counts and times compare by their ratios only. Times are \
          processor seconds of one thread; what is compared ran in the same process, one beside the other. *Error* is \
          the mean distance of what distributions show from the reflected samples themselves, in 3000 directions \
          weighted by their cosine, relative to the mean. \"Levels m/M\" and ε are the paper's: subdivision down to level m \
          everywhere, and further down to M where samples differ by more than ε of the value in the middle.",
-    ));
+    );
 }
 
 /// How many times smaller the first of two numbers is.
