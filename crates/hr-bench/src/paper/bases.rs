@@ -11,7 +11,6 @@ use glossy_ext::{Basis, GlossyField, Reflector};
 use hr_diffuse::{Settings, Solution, Solver};
 use hr_scene::{Camera, Image, Scene};
 use hr_view::Mode;
-use hr_view::path_tracer::{self, PathTracer};
 use hr_view::raycast::RayCaster;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -26,8 +25,6 @@ const LEVELS: [u8; 4] = [3, 4, 5, 6];
 const FINER: [(f32, u8); 7] = [(0.2, 3), (0.2, 4), (0.2, 5), (0.1, 6), (0.05, 5), (0.02, 5), (0.02, 6)];
 /// Error that the solver is asked for to show the solution.
 const SHOWN_ERROR: f32 = 0.05;
-/// Paths per pixel of the reference.
-const PATHS: u32 = 100;
 /// Width of the pictures, pixels.
 const WIDTH: u32 = 200;
 
@@ -139,33 +136,34 @@ pub(super) fn report(page: &mut Page<'_>) -> Result<(), BenchError> {
             part(|m| m.seconds),
         ]);
     }
-    page.text(&format!(
+    page.text(
         "Above non-adaptive, in the middle Haar by the paper's refiner, left to level 3, right to level 4; below left Haar by \
-         our refiner, as `hr-view` uses it, right a path tracer's picture ({PATHS} paths per pixel):"
-    ));
+         our refiner, as `hr-view` uses it, right a final gather:",
+    );
+    let shows = Mode::Distributions;
     let pictures = [
-        vec![shown::<NonAdaptive>(&scene, Level(3))?, shown::<NonAdaptive>(&scene, Level(4))?],
-        vec![shown::<Haar>(&scene, relative(0.5, [1, 3]))?, shown::<Haar>(&scene, relative(0.5, [1, 4]))?],
-        vec![shown::<Haar>(&scene, Refinement::default())?, reference(&scene)?],
+        vec![shown::<NonAdaptive>(&scene, Level(3), shows)?, shown::<NonAdaptive>(&scene, Level(4), shows)?],
+        vec![
+            shown::<Haar>(&scene, relative(0.5, [1, 3]), shows)?,
+            shown::<Haar>(&scene, relative(0.5, [1, 4]), shows)?,
+        ],
+        vec![
+            shown::<Haar>(&scene, Refinement::default(), shows)?,
+            shown::<Haar>(&scene, Refinement::default(), Mode::Gather)?,
+        ],
     ];
     page.picture("figure-7", "The glossy floor in both bases", &side_by_side(&pictures))
 }
 
-/// A picture of the scene by its distributions in some basis.
-fn shown<B: Basis>(scene: &Arc<Scene>, settings: B::Settings) -> Result<Image, BenchError> {
+/// A picture of the scene with its distributions in some basis.
+fn shown<B: Basis>(scene: &Arc<Scene>, settings: B::Settings, mode: Mode) -> Result<Image, BenchError> {
     let field = GlossyField::<B>::in_basis(&scene.reflectors(), settings);
     let mut solver = Solver::new(&scene.input(), Settings::with_error(SHOWN_ERROR), field)?;
     let going_on = |_: &_| ControlFlow::Continue(());
     solver.solve(&mut { going_on });
     solver.reflect_for_display(&mut { going_on });
     let solution = solver.finish(&mut { going_on });
-    Ok(RayCaster::new(scene, &solution, Mode::Distributions).with_grid(2).render(&view(scene)?, &|_| ()))
-}
-
-/// The same by path tracing.
-fn reference(scene: &Scene) -> Result<Image, BenchError> {
-    let visibility = path_tracer::visibility(scene)?;
-    Ok(PathTracer::new(scene, &visibility).render(&view(scene)?, PATHS, 0, &|_| ()).image)
+    Ok(RayCaster::new(scene, &solution, mode).with_grid(2).render(&view(scene)?, &|_| ()))
 }
 
 fn view(scene: &Scene) -> Result<Camera, BenchError> {
