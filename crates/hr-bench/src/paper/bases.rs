@@ -176,9 +176,10 @@ fn view(scene: &Scene) -> Result<Camera, BenchError> {
 mod tests {
     use super::*;
 
-    /// Where highlights are represented at all, the adaptive basis needs half of the memory at most, and no more time.
+    /// Where highlights are represented at all, the adaptive basis needs half of the memory at most, and fewer
+    /// evaluations.
     #[test]
-    fn haar_is_smaller_and_no_slower_at_equal_error() {
+    fn haar_is_smaller_and_evaluates_less_at_equal_error() {
         let scene = Arc::new(Scene::load(SCENE).expect("built in"));
         let reflectors = scene.reflectors();
         let solution = solve(&scene.input(), &reflectors, ERROR).expect("sound");
@@ -188,10 +189,10 @@ mod tests {
         assert!(even[0].error > 0.3, "level 3 misses highlights: {:?}", even[0]);
         for (level, made) in LEVELS.iter().zip(&even).skip(2) {
             let memory = share(&haar, made, |m| m.bytes as f64).expect("within the range");
-            let time = share(&haar, made, |m| m.seconds).expect("within the range");
+            // Times would be spoilt by other tests beside this one.
+            let work = share(&haar, made, |m| m.evaluations as f64).expect("within the range");
             assert!(memory <= 0.5, "level {level}: {memory} of the memory");
-            // Timed beside other tests.
-            assert!(time <= 1.5, "level {level}: {time} of the time");
+            assert!(work <= 0.8, "level {level}: {work} of the evaluations");
         }
     }
 }

@@ -156,12 +156,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn illumination_samples_take_fewer_functions_and_less_time() {
+    fn illumination_samples_take_fewer_functions_and_evaluations() {
         let scene = Arc::new(Scene::load("empty-room").expect("built in"));
         let [is, rc] = both(&scene, relative(0.5, [1, 3]), 0.2).expect("sound");
         let (sent, kept) = (rc.functions, RadianceClustering::DISTRIBUTIONS * rc.functions);
         assert!(is.functions < sent && 10 * is.functions <= 6 * kept, "functions: {} and {kept}", is.functions);
-        assert!(is.seconds <= 0.5 * rc.seconds, "seconds: {} and {}", is.seconds, rc.seconds);
+        // Times would be spoilt by other tests beside this one.
+        assert!(is.evaluations < rc.evaluations, "evaluations: {} and {}", is.evaluations, rc.evaluations);
         // The solutions are the same but for how glossy light is represented.
         let links = is.links as f64 / rc.links as f64;
         assert!((links - 1.0).abs() < 0.1, "links: {} and {}", is.links, rc.links);
