@@ -1,9 +1,10 @@
 //! The glossy light field: illumination samples in, directional distributions out, through the hooks alone.
 
 use crate::Rgb;
-use crate::haar::{Beyond, Haar, Known, Peak, Refinement, Support};
+use crate::basis::{Basis, Beyond, Known, Peak, Support};
+use crate::haar::{Haar, Refinement};
 use crate::reflector::{Incident, Reflector, Ward};
-use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_weak};
+use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_close, merge_weak};
 use glam::Vec3;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
 use std::f32::consts::FRAC_PI_2;
@@ -87,22 +88,31 @@ impl Counters {
     }
 }
 
-/// Glossy reflection for an engine: implements its hooks.
+/// Glossy reflection for an engine: implements its hooks. Outgoing light is represented in the basis `B`.
 ///
 /// Reflectors are not trusted: what no surface can do is clamped and [counted](Counters::clamped), so that a wrong one
 /// shows in its own place and never spoils the solution.
 #[derive(Debug)]
-pub struct GlossyField {
+pub struct GlossyField<B: Basis = Haar> {
     /// `None`: the material is diffuse.
     materials: Vec<Option<Material>>,
-    refinement: Refinement,
+    settings: B::Settings,
     counters: Counters,
 }
 
 impl GlossyField {
-    /// For the materials of a scene, by index. Those whose reflector is diffuse take no part.
+    /// For the materials of a scene, by index. Those whose reflector is diffuse take no part. Outgoing light is
+    /// represented in the adaptive Haar basis.
     #[must_use]
     pub fn new(reflectors: &[Arc<dyn Reflector>], refinement: Refinement) -> Self {
+        Self::in_basis(reflectors, refinement)
+    }
+}
+
+impl<B: Basis> GlossyField<B> {
+    /// As [`new`](GlossyField::new), in any basis.
+    #[must_use]
+    pub fn in_basis(reflectors: &[Arc<dyn Reflector>], settings: B::Settings) -> Self {
         let counters = Counters::default();
         let materials = reflectors.iter().map(|reflector| {
             (!reflector.is_diffuse()).then(|| {
@@ -122,7 +132,7 @@ impl GlossyField {
             })
         });
         let materials = materials.collect();
-        Self { materials, refinement, counters }
+        Self { materials, settings, counters }
     }
 
     /// Work done so far.
@@ -133,6 +143,65 @@ impl GlossyField {
 
     fn material(&self, material: Option<u32>) -> Option<&Material> {
         self.materials.get(material? as usize)?.as_ref()
+    }
+
+    /// What a leaf is about to reflect; arguments as those of [`LightField::reflect`]. `None` where nothing arrives or the
+    /// material is diffuse.
+    #[must_use]
+    pub fn reflection<H: Hierarchy>(
+        &self,
+        hierarchy: &H,
+        leaf: NodeId,
+        path: &[&SampleSet],
+        arrived: Arrived,
+    ) -> Option<Reflection<'_>> {
+        let material = self.material(hierarchy.material(leaf))?;
+        let place = Place::along(hierarchy.center(leaf), hierarchy.normals(leaf).axis, material.reflector.grain());
+        let mut incident = Vec::new();
+        arriving(hierarchy, leaf, path, &place, &mut incident);
+        if incident.is_empty() {
+            return None;
+        }
+        balance(&mut incident, arrived.irradiance);
+        let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
+        // A lobe that is not round is narrower one way; a mirror shows everything.
+        if material.mirror.is_none() && material.reflector.grain().is_none() {
+            merge_close(&mut incident, width);
+        }
+        merge_weak(&mut incident);
+        // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
+        // Normals that turn by an angle turn what is reflected by twice as much.
+        let narrowest = (2.0 * arrived.spread).clamp(NARROWEST, FRAC_PI_2);
+        for sample in &mut incident {
+            sample.extent = sample.extent.max(if width < WIDE * narrowest { narrowest } else { 0.0 });
+            if sample.extent * WIDE < width {
+                sample.extent = 0.0;
+            }
+        }
+        // A glossy part may be negative where the diffuse one overestimates; both together are not.
+        let (flat, least) = (hierarchy.is_flat(leaf), -arrived.diffuse);
+        Some(Reflection { material, place, incident, flat, least })
+    }
+
+    /// Represents what a leaf reflects in the basis.
+    #[must_use]
+    pub fn project(&self, reflection: &Reflection<'_>) -> B {
+        let known = Known {
+            support: Some(reflection.support()),
+            offset: -reflection.least,
+            peaks: &peaks(reflection.material, &reflection.incident, &reflection.place),
+        };
+        let mut overruled = 0;
+        let projected = B::project(&self.settings, &known, |direction| {
+            let (light, is_clamped) = reflection.clamped(direction);
+            overruled += u64::from(is_clamped);
+            light
+        });
+        let count = reflection.incident.len() as u64;
+        self.counters.evaluations.fetch_add(projected.evaluations as u64 * count, Ordering::Relaxed);
+        self.counters.samples.fetch_add(count, Ordering::Relaxed);
+        self.counters.clamped.fetch_add(overruled + projected.not_finite as u64, Ordering::Relaxed);
+        projected.distribution
     }
 
     /// The reflector of a material that takes part.
@@ -186,9 +255,71 @@ fn balance(incident: &mut [Incident], irradiance: Rgb) {
     }
 }
 
-impl LightField for GlossyField {
+/// What a leaf reflects of the samples that arrive at it, before it is projected: a function of the direction.
+#[derive(Debug)]
+pub struct Reflection<'a> {
+    material: &'a Material,
+    place: Place,
+    incident: Vec<Incident>,
+    /// Whether it is radiance rather than intensity per area.
+    flat: bool,
+    /// No less than what cancels the diffuse part.
+    least: Rgb,
+}
+
+impl Reflection<'_> {
+    /// The leaf's middle and its frame.
+    #[must_use]
+    pub fn place(&self) -> &Place {
+        &self.place
+    }
+
+    /// The samples, directions in the frame of the place.
+    #[must_use]
+    pub fn incident(&self) -> &[Incident] {
+        &self.incident
+    }
+
+    /// What the leaf sends in a unit direction away from it, as [`LightField::radiance`] tells of its projection; lobes
+    /// are widened to what transport resolves. Not finite where the reflector says so.
+    #[must_use]
+    pub fn toward(&self, direction: Vec3) -> Rgb {
+        let (light, _) = self.clamped(direction);
+        light
+    }
+
+    /// The same, and whether the reflector had to be overruled.
+    fn clamped(&self, direction: Vec3) -> (Rgb, bool) {
+        let outgoing = self.place.local(direction);
+        let reflected = self.material.reflect(&self.incident, outgoing);
+        // What is not finite the projection itself replaces and counts.
+        let radiance = if reflected.is_finite() { reflected.max(self.least) } else { reflected };
+        let is_clamped = (radiance - reflected).cmpgt(CLAMPED * radiance.abs()).any();
+        (if self.flat { radiance } else { radiance * outgoing.z.max(0.0) }, is_clamped)
+    }
+
+    /// Scales a distribution down to what the leaf can reflect of an irradiance: a projection that overestimates a narrow
+    /// lobe would let mirrors facing each other shine without end.
+    pub fn conserve<B: Basis>(&self, exitant: &mut B, irradiance: Rgb) {
+        let power = if self.flat { exitant.cosine_integral(self.place.normal()) } else { exitant.integral() };
+        let (power, most) = (power.element_sum(), MOST_GAIN * (self.material.albedo * irradiance).element_sum());
+        if power > most {
+            exitant.scale(most / power);
+        }
+    }
+
+    /// Where it is not zero.
+    fn support(&self) -> Support {
+        Support {
+            cone: Cone { axis: self.place.normal(), cos_angle: 1e-3 },
+            beyond: if self.flat { Beyond::Continued } else { Beyond::Zero },
+        }
+    }
+}
+
+impl<B: Basis> LightField for GlossyField<B> {
     type Incident = SampleSet;
-    type Exitant = Haar;
+    type Exitant = B;
 
     fn active(&self, material: u32) -> Option<Rgb> {
         self.material(Some(material)).map(|m| m.albedo)
@@ -198,8 +329,8 @@ impl LightField for GlossyField {
         size_of_val(&**incident)
     }
 
-    fn exitant_bytes(&self, exitant: &Haar) -> usize {
-        exitant.bytes() - size_of::<Haar>()
+    fn exitant_bytes(&self, exitant: &B) -> usize {
+        exitant.bytes() - size_of::<B>()
     }
 
     fn clear(&self, incident: &mut SampleSet) {
@@ -211,68 +342,20 @@ impl LightField for GlossyField {
         incident.push(IlluminationSample::new(transfer));
     }
 
-    fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], arrived: Arrived) -> Haar {
+    fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], arrived: Arrived) -> B {
         debug_assert_eq!(arrived.fault(), None, "the host keeps to what the hooks ask for: {arrived:?}");
         debug_assert!(!path.is_empty(), "the path of leaf {} has the leaf itself in it", leaf.0);
-        let Some(material) = self.material(hierarchy.material(leaf)) else { return Haar::default() };
-        let place = Place::along(hierarchy.center(leaf), hierarchy.normals(leaf).axis, material.reflector.grain());
-        let mut incident = Vec::new();
-        arriving(hierarchy, leaf, path, &place, &mut incident);
-        if incident.is_empty() {
-            return Haar::default();
-        }
-        balance(&mut incident, arrived.irradiance);
-        merge_weak(&mut incident);
-        // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
-        let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
-        // Normals that turn by an angle turn what is reflected by twice as much.
-        let narrowest = (2.0 * arrived.spread).clamp(NARROWEST, FRAC_PI_2);
-        for sample in &mut incident {
-            sample.extent = sample.extent.max(if width < WIDE * narrowest { narrowest } else { 0.0 });
-            if sample.extent * WIDE < width {
-                sample.extent = 0.0;
-            }
-        }
-        let flat = hierarchy.is_flat(leaf);
-        let known = Known {
-            support: Some(Support {
-                cone: Cone { axis: place.normal(), cos_angle: 1e-3 },
-                beyond: if flat { Beyond::Continued } else { Beyond::Zero },
-            }),
-            offset: arrived.diffuse,
-            peaks: &peaks(material, &incident, &place),
-        };
-        // A glossy part may be negative where the diffuse one overestimates; both together are not.
-        let least = -arrived.diffuse;
-        let mut negative = 0;
-        let projected = Haar::project(&self.refinement, &known, |direction| {
-            let outgoing = place.local(direction);
-            let reflected = material.reflect(&incident, outgoing);
-            // What is not finite the projection itself replaces and counts.
-            let radiance = if reflected.is_finite() { reflected.max(least) } else { reflected };
-            negative += u64::from((radiance - reflected).cmpgt(CLAMPED * radiance.abs()).any());
-            // On elements that are not flat, intensity per area.
-            if flat { radiance } else { radiance * outgoing.z.max(0.0) }
-        });
-        let evaluations = projected.evaluations as u64 * incident.len() as u64;
-        self.counters.evaluations.fetch_add(evaluations, Ordering::Relaxed);
-        self.counters.samples.fetch_add(incident.len() as u64, Ordering::Relaxed);
-        self.counters.clamped.fetch_add(negative + projected.not_finite as u64, Ordering::Relaxed);
-        let mut haar = projected.haar;
-        // A projection that overestimates a narrow lobe would let mirrors facing each other shine without end.
-        let power = if flat { haar.cosine_integral(place.normal()) } else { haar.integral() }.element_sum();
-        let most = MOST_GAIN * (material.albedo * arrived.irradiance).element_sum();
-        if power > most {
-            haar.scale(most / power);
-        }
-        haar
+        let Some(reflection) = self.reflection(hierarchy, leaf, path, arrived) else { return B::default() };
+        let mut exitant = self.project(&reflection);
+        reflection.conserve(&mut exitant, arrived.irradiance);
+        exitant
     }
 
-    fn radiance(&self, exitant: &Haar, away: Vec3) -> Rgb {
+    fn radiance(&self, exitant: &B, away: Vec3) -> Rgb {
         exitant.eval(away)
     }
 
-    fn radiance_bounds(&self, exitant: &Haar, away: &Cone) -> (Rgb, Rgb) {
+    fn radiance_bounds(&self, exitant: &B, away: &Cone) -> (Rgb, Rgb) {
         exitant.bounds(away)
     }
 }

@@ -16,9 +16,16 @@
 //! let lobe = |d: Vec3| Vec3::splat(d.dot(axis).max(0.0).powi(200));
 //! let peaks = [Peak { direction: axis, width: 0.1 }];
 //! let made = Haar::project(&Refinement::default(), &Known { peaks: &peaks, ..Known::NOTHING }, lobe);
-//! assert!((made.haar.eval(axis).x - 1.0).abs() < 0.05);
-//! assert!(made.haar.eval(-axis).x < 1e-3);
+//! assert!((made.distribution.eval(axis).x - 1.0).abs() < 0.05);
+//! assert!(made.distribution.eval(-axis).x < 1e-3);
 //! ```
+//!
+//! # Triangles
+//! A direction d is parametrised by the point p = d / (|x| + |y| + |z|) of the octahedron's surface. Triangles are
+//! subdivided at the midpoints of that *flat* surface: corners are dyadic fractions, exact in `f32`; finding the
+//! triangle of a direction takes only doublings of barycentric coordinates; and the solid angles of the triangles
+//! of one level differ by no more than the Jacobian 1/(√3 |p|³), a factor of 5.2 between a corner of the octahedron
+//! and the middle of a face.
 //!
 //! # Layout
 //! A *basis function* is one undivided triangle ([`Haar::basis_functions`]). At rest a distribution is an array of
@@ -36,23 +43,23 @@
 //! or finer in parts). Refinement stops there, coarse levels first, and says so ([`Projected::truncated`]).
 
 mod combine;
-mod half;
 mod keep;
 mod mesh;
 mod outline;
 mod project;
 #[cfg(test)]
 mod tests;
-mod triangle;
 
+pub use crate::basis::{Beyond, Known, Peak, Projected, Support};
 pub use outline::Outline;
-pub use project::{Beyond, Known, Peak, Projected, Refinement, Refiner, Support};
+pub use project::{Refinement, Refiner};
 
 use crate::Rgb;
+use crate::basis::Basis;
+use crate::basis::half::{Half3, decode, encode, scale_for};
+use crate::basis::triangle::{ConeTest, Overlap, PIECE_SPLITS, Triangle, child_corners, midpoints};
 use glam::{DVec3, Vec3};
-use half::{Half3, decode, encode, scale_for};
 use hr_diffuse::Cone;
-use triangle::{ConeTest, Overlap, Triangle, child_corners, face_corners, midpoints};
 
 /// Deepest level of subdivision: triangles 0.02° across. Positions stay exact and barycentric coordinates, which
 /// lose a bit per level, keep more than what half floats can show.
@@ -116,6 +123,12 @@ impl Node {
         let base = (self.0 >> 45) as usize & 0x7fff;
         Some(base + (COUNTS >> (2 * before) & 3))
     }
+}
+
+/// Face of the octahedron by its signs (bit 0: x < 0, bit 1: y < 0, bit 2: z < 0) → its corners.
+fn face_corners(face: usize) -> [Vec3; 3] {
+    let sign = |axis: usize| if face >> axis & 1 == 1 { -1.0 } else { 1.0 };
+    [Vec3::X * sign(0), Vec3::Y * sign(1), Vec3::Z * sign(2)]
 }
 
 /// A triangle on the way down the tree.
@@ -207,9 +220,13 @@ impl Haar {
                 false
             }
         };
-        self.pieces(enter, &mut |triangle, values| {
-            bound_piece(triangle, values, cone, &test, PIECE_SPLITS, &mut low, &mut high);
-        });
+        let piece = &mut |triangle: &Triangle, values: [Rgb; 3]| {
+            triangle.bound(values, &test, PIECE_SPLITS, &mut low, &mut high);
+        };
+        match self.smallest_around(&test) {
+            Some(visit) => self.pieces_below(&visit, enter, piece),
+            None => self.pieces(enter, piece),
+        }
         (low, high) = (low.min(low_inside), high.max(high_inside));
         if low.cmpgt(high).any() {
             // No cone at all: one of its numbers is not a number.
@@ -218,6 +235,33 @@ impl Haar {
         // Rounding in the interpolation, a few units in the last place of the largest value involved.
         let slack = low.abs().max(high.abs()) * (4.0 * f32::EPSILON);
         ((low - slack) * self.scale, (high + slack) * self.scale)
+    }
+
+    /// The smallest triangle that holds a whole cone, if any does: bounds over narrow cones start there.
+    fn smallest_around(&self, cone: &ConeTest) -> Option<Visit> {
+        let axis = cone.axis();
+        let face = axis.cmplt(Vec3::ZERO).bitmask() as usize;
+        let mut around = Visit {
+            triangle: Triangle::new(face_corners(face)),
+            vertices: Self::face_vertices(face),
+            node: self.root(face),
+            level: 0,
+        };
+        if !around.triangle.holds(cone) {
+            return None;
+        }
+        let size = axis.abs();
+        let mut at = size / size.element_sum();
+        while let Some(node) = around.node.map(|n| self.nodes[n]).filter(|n| n.is_divided()) {
+            let child = descend(&mut at).index();
+            let triangle = around.triangle.child(child);
+            if !triangle.holds(cone) {
+                break;
+            }
+            let vertices = child_corners(around.vertices, node.mids(), child);
+            around = Visit { triangle, vertices, node: node.child(child), level: around.level + 1 };
+        }
+        Some(around)
     }
 
     /// ∫ over the sphere, per steradian of the quantity: of intensity (W/sr), the power (W).
@@ -278,9 +322,9 @@ impl Haar {
         };
         let node = self.nodes[index];
         if node.is_divided() {
-            for child in 0..4 {
+            for (child, triangle) in visit.triangle.children().into_iter().enumerate() {
                 let below = Visit {
-                    triangle: visit.triangle.child(child),
+                    triangle,
                     vertices: child_corners(visit.vertices, node.mids(), child),
                     node: node.child(child),
                     level: visit.level + 1,
@@ -290,8 +334,8 @@ impl Haar {
         } else {
             let corners = values();
             let mids = self.mid_values(corners, node);
-            for child in 0..4 {
-                piece(&visit.triangle.child(child), child_corners(corners, mids, child));
+            for (child, triangle) in visit.triangle.children().iter().enumerate() {
+                piece(triangle, child_corners(corners, mids, child));
             }
         }
     }
@@ -393,6 +437,55 @@ impl Haar {
     }
 }
 
+impl Basis for Haar {
+    type Settings = Refinement;
+
+    fn project(settings: &Refinement, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected<Self> {
+        Self::project(settings, known, f)
+    }
+
+    #[inline]
+    fn eval(&self, direction: Vec3) -> Rgb {
+        self.eval(direction)
+    }
+
+    fn add(&self, other: &Self) -> Self {
+        self.add(other)
+    }
+
+    fn scale(&mut self, factor: f32) {
+        self.scale(factor);
+    }
+
+    fn average(distributions: &[(f32, &Self)], settings: &Refinement, offset: Rgb) -> Self {
+        Self::average(distributions, settings, offset)
+    }
+
+    fn bounds(&self, cone: &Cone) -> (Rgb, Rgb) {
+        self.bounds(cone)
+    }
+
+    fn integral(&self) -> Rgb {
+        self.integral()
+    }
+
+    fn cosine_integral(&self, normal: Vec3) -> Rgb {
+        self.cosine_integral(normal)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.is_empty()
+    }
+
+    fn basis_functions(&self) -> usize {
+        self.basis_functions()
+    }
+
+    fn bytes(&self) -> usize {
+        self.bytes()
+    }
+}
+
 /// Which child holds a point: the one at corner 0, 1, 2, or the one in the middle if none is set.
 ///
 /// A look-up takes a step for each level, and which way it goes is not to be predicted: flags and selection instead
@@ -443,33 +536,4 @@ fn descend(at: &mut Vec3) -> Which {
 #[inline]
 fn interpolate(at: Vec3, a: Rgb, b: Rgb, c: Rgb) -> Rgb {
     (at.x * a + at.y * b + at.z * c) / (at.x + at.y + at.z)
-}
-
-/// How often [`Haar::bounds`] divides a linear piece that is much larger than the cone.
-const PIECE_SPLITS: u32 = 6;
-
-/// Extends bounds by a linear piece, by its parts that the cone touches where it is larger than the cone.
-fn bound_piece(
-    triangle: &Triangle,
-    values: [Rgb; 3],
-    cone: &Cone,
-    test: &ConeTest,
-    splits: u32,
-    low: &mut Rgb,
-    high: &mut Rgb,
-) {
-    let (min, max) = (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]));
-    if min.cmpge(*low).all() && max.cmple(*high).all() || !triangle.touches(test) {
-        return;
-    }
-    if splits == 0 || triangle.cos_radius() >= cone.cos_angle {
-        *low = low.min(min);
-        *high = high.max(max);
-        return;
-    }
-    let mids = midpoints(values);
-    for child in 0..4 {
-        let part = child_corners(values, mids, child);
-        bound_piece(&triangle.child(child), part, cone, test, splits - 1, low, high);
-    }
 }

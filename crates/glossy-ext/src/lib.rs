@@ -5,6 +5,7 @@
 //! # Features
 //! `parallel` (default): that of `hr-diffuse`.
 
+pub mod basis;
 pub mod conformance;
 pub mod field;
 pub mod haar;
@@ -12,7 +13,8 @@ mod keep;
 pub mod reflector;
 pub mod samples;
 
-pub use field::GlossyField;
+pub use basis::Basis;
+pub use field::{GlossyField, Reflection};
 pub use hr_diffuse::{Rgb, hooks};
 pub use reflector::{
     Compensated, Incident, Lambert, Lobe, MerlError, MetallicRoughness, Phong, Reflector, ReflectorError, Sample, Sum,

@@ -3,7 +3,7 @@
 
 use crate::Rgb;
 use crate::reflector::Incident;
-use glam::{Mat3, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 use hr_diffuse::{Hierarchy, NodeId, Transfer};
 
 /// Marks samples of receivers that are oriented: their irradiance includes the cosine.
@@ -113,19 +113,35 @@ pub fn arriving<H: Hierarchy>(
     }
 }
 
-/// Samples that are merged make up at most this share of the irradiance at a place.
+/// Weak samples that are merged make up at most this share of the irradiance at a place.
 const WEAK_SHARE: f32 = 0.3;
-/// Cells along each side of the square that the hemisphere of directions is mapped to.
-const CELLS: usize = 6;
+/// Cells along each side of the square that the hemisphere of directions is mapped to, for weak samples: 25° wide.
+const WEAK_CELLS: f32 = 6.0;
+/// Cells for close samples are at most this part of the lobe's width. What is merged then lies within a ninth of the width
+/// from its mean (standard deviation, per axis), and widens the lobe by less than a hundredth.
+const CLOSE: f32 = 0.25;
 
-/// Merges the weakest samples at a place into one for each cell of a grid of directions (about 25° wide): irradiance
-/// adds up, the direction is the weighted mean, and the extent grows by how far they spread. The strong ones, which
-/// make the peaks of what is reflected, stay as they are.
+/// Strength of a sample, for its place among the others.
+fn strength(sample: &Incident) -> f32 {
+    sample.irradiance.element_sum()
+}
+
+/// Merges samples that are so close together that a lobe of this width (radians) cannot tell them apart: of many small parts
+/// of one sender there are as few left as the lobe can show. Where the width is 0, all samples stay as they are.
+pub fn merge_close(incident: &mut Vec<Incident>, width: f32) {
+    // A cell of the square is 4/cells wide at the zenith, half of that at the horizon.
+    let cells = 4.0 / (CLOSE * width);
+    if incident.len() > 1 && cells < f32::from(u16::MAX) {
+        merge(incident, 0, cells.max(1.0));
+    }
+}
+
+/// Merges the weakest samples at a place, so that no more than 36 of them are left. The strong ones, which make the peaks
+/// of what is reflected, stay as they are.
 pub fn merge_weak(incident: &mut Vec<Incident>) {
-    if incident.len() <= CELLS * CELLS {
+    if incident.len() <= (WEAK_CELLS * WEAK_CELLS) as usize {
         return;
     }
-    let strength = |i: &Incident| i.irradiance.element_sum();
     incident.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     let total: f32 = incident.iter().map(strength).sum();
     let mut rest = 0.0;
@@ -134,26 +150,45 @@ pub fn merge_weak(incident: &mut Vec<Incident>) {
         strong -= 1;
         rest += strength(&incident[strong]);
     }
-    // Direction, squared extent plus squared length, weight and irradiance per cell.
-    let mut cells = [(Vec3::ZERO, 0.0_f32, 0.0_f32, Rgb::ZERO); CELLS * CELLS];
-    for sample in incident.drain(strong..) {
-        let weight = strength(&sample);
+    merge(incident, strong, WEAK_CELLS);
+}
+
+/// Merges the samples from one on into one for each cell of a grid of directions, with so many cells along each side:
+/// irradiance adds up, the direction is the weighted mean, and the extent grows by how far they spread.
+fn merge(incident: &mut Vec<Incident>, from: usize, cells: f32) {
+    let cell = |sample: &Incident| {
         let square = sample.direction.truncate() / (1.0 + sample.direction.z.max(0.0)) * 0.5 + 0.5;
-        let cell = (square * CELLS as f32).clamp(glam::Vec2::ZERO, glam::Vec2::splat(CELLS as f32 - 1.0));
-        let cell = &mut cells[cell.y as usize * CELLS + cell.x as usize];
-        cell.0 += sample.direction * weight;
-        cell.1 += sample.extent * sample.extent * weight;
-        cell.2 += weight;
-        cell.3 += sample.irradiance;
+        let cell = (square * cells).clamp(Vec2::ZERO, Vec2::splat(cells)).floor();
+        (cell.y as u32, cell.x as u32)
+    };
+    incident[from..].sort_by_key(cell);
+    let mut kept = from;
+    let mut next = from;
+    while next < incident.len() {
+        let here = cell(&incident[next]);
+        let count = incident[next..].iter().take_while(|sample| cell(sample) == here).count();
+        incident[kept] = together(&incident[next..next + count]);
+        kept += 1;
+        next += count;
     }
-    for (direction, extent, weight, irradiance) in cells {
-        if weight > 0.0 {
-            let mean = direction / weight;
-            // Unit vectors about their mean: 1 − |mean|² is their variance; a disk's is half its squared radius.
-            let spread = 2.0 * (1.0 - mean.length_squared()).max(0.0);
-            let extent = (extent / weight + spread).sqrt().min(std::f32::consts::FRAC_PI_2);
-            incident.push(Incident { direction: mean.normalize_or(Vec3::Z), extent, irradiance });
-        }
+    incident.truncate(kept);
+}
+
+/// One sample in place of several.
+fn together(samples: &[Incident]) -> Incident {
+    let weight: f32 = samples.iter().map(strength).sum();
+    if samples.len() == 1 || weight <= 0.0 {
+        return samples[0];
+    }
+    let weighted = |of: fn(&Incident) -> Vec3| samples.iter().map(|s| of(s) * strength(s)).sum::<Vec3>() / weight;
+    let mean = weighted(|s| s.direction);
+    let extent2 = weighted(|s| Vec3::splat(s.extent * s.extent)).x;
+    // Unit vectors about their mean: 1 − |mean|² is their variance; a disk's is half its squared radius.
+    let spread = 2.0 * (1.0 - mean.length_squared()).max(0.0);
+    Incident {
+        direction: mean.normalize_or(Vec3::Z),
+        extent: (extent2 + spread).sqrt().min(std::f32::consts::FRAC_PI_2),
+        irradiance: samples.iter().map(|s| s.irradiance).sum(),
     }
 }
 
@@ -192,6 +227,67 @@ fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Plac
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reflector::{MetallicRoughness, Phong, Reflector, Ward};
+
+    #[test]
+    fn samples_are_small() {
+        assert_eq!(size_of::<IlluminationSample>(), 16, "bytes of a sample at rest");
+    }
+
+    /// A square light of 20° in n × n parts.
+    fn light(n: usize) -> Vec<Incident> {
+        let part = |i: usize| {
+            let [x, y] = [i % n, i / n].map(|k| 0.36 * ((k as f32 + 0.5) / n as f32 - 0.5));
+            let direction = Vec3::new(0.5 + x, y, 0.8).normalize();
+            Incident { direction, extent: 0.0, irradiance: Rgb::new(1.0, 0.5, 0.2) / (n * n) as f32 }
+        };
+        (0..n * n).map(part).collect()
+    }
+
+    /// However finely a light is divided, there is only so much that a lobe can show of it.
+    #[test]
+    fn close_samples_count_once() {
+        let reflectors: [Box<dyn Reflector>; 3] = [
+            Box::new(Ward::new(Rgb::ZERO, Rgb::splat(0.8), 0.1).expect("a Ward reflector")),
+            Box::new(Phong::new(Rgb::ZERO, Rgb::splat(0.8), 40.0).expect("a Phong reflector")),
+            Box::new(MetallicRoughness::new(Rgb::ONE, 1.0, 0.35).expect("a metal")),
+        ];
+        for reflector in reflectors {
+            let width = reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
+            let mut counts = Vec::new();
+            for n in [8, 16, 32, 64] {
+                let all = light(n);
+                let mut few = all.clone();
+                merge_close(&mut few, width);
+                counts.push(few.len());
+                let sum = |of: &[Incident]| of.iter().map(|i| i.irradiance).sum::<Rgb>();
+                assert!((sum(&all) - sum(&few)).abs().max_element() < 1e-4, "irradiance adds up");
+                let (mut off, mut total) = (0.0, 0.0);
+                for k in 0..400 {
+                    let turn = Vec2::from_angle(k as f32 * 2.399_963_2) * ((k as f32 + 0.5) / 400.0).sqrt() * 0.6;
+                    let outgoing = Vec3::new(turn.x - 0.5, turn.y, 0.8).normalize();
+                    let right = reflector.reflect_sum(&all, outgoing);
+                    off += (reflector.reflect_sum(&few, outgoing) - right).abs().element_sum();
+                    total += right.element_sum();
+                }
+                assert!(
+                    off < 0.005 * total,
+                    "{reflector:?}: {} of {} samples, off by {}",
+                    few.len(),
+                    n * n,
+                    off / total
+                );
+            }
+            assert!(counts[3] < 2 * counts[1] && counts[3] < 700, "64 times the samples: {counts:?}");
+        }
+    }
+
+    #[test]
+    fn mirrors_tell_all_samples_apart() {
+        let mut all = light(16);
+        merge_close(&mut all, 0.0);
+        assert_eq!(all, light(16), "nothing is merged");
+    }
 
     #[test]
     fn frames_follow_the_grain() {

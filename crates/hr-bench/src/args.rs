@@ -32,6 +32,8 @@ pub enum Command {
     FormFactors(FormFactorArgs),
     /// Rays per second on one thread: a Markdown table
     Visibility(VisibilityArgs),
+    /// The paper's tables 1 to 4 and figures 4 and 7, made anew: a Markdown page with pictures
+    Paper(PaperArgs),
 }
 
 /// Of `hr-bench reference`.
@@ -208,6 +210,22 @@ pub struct VisibilityArgs {
     /// Rays of each kind
     #[arg(long, value_name = "N", default_value_t = 1 << 19, value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
     pub rays: u32,
+}
+
+/// Of `hr-bench paper`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct PaperArgs {
+    /// Scene files or names of built-in scenes for tables 3 and 4, beside those that are always there
+    #[arg(value_name = "SCENE")]
+    pub scenes: Vec<String>,
+
+    /// Error to ask for in tables 3 and 4
+    #[arg(long, value_name = "E", default_value_t = 0.05)]
+    pub error: f32,
+
+    /// Where paper-tables.md and its pictures go
+    #[arg(long, value_name = "DIR", default_value = "target/hr-bench")]
+    pub out: PathBuf,
 }
 
 #[cfg(test)]

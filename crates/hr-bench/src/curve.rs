@@ -149,8 +149,9 @@ fn distance(ours: &[(f64, Rgb)], right: &[(f64, Rgb)]) -> f64 {
     if total > 0.0 { error / total } else { 0.0 }
 }
 
-/// The time at which an error is reached, between published points, both in logarithms.
-fn time_at(points: &[[f64; 2]], error: f64) -> Option<f64> {
+/// The time (or whatever else an error costs) at which an error is reached, between points of (time, error), both in
+/// logarithms.
+pub(crate) fn time_at(points: &[[f64; 2]], error: f64) -> Option<f64> {
     points.windows(2).find_map(|pair| {
         let [[t0, e0], [t1, e1]] = [pair[0], pair[1]];
         let share = (error / e0).ln() / (e1 / e0).ln();

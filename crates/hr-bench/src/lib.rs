@@ -11,6 +11,7 @@
 //! | `threads` | what more threads bring, and that they change nothing |
 //! | `form-factors` | form factors against closed forms and brute force |
 //! | `visibility` | rays per second |
+//! | `paper` | what the paper's tables and figures compare |
 
 pub mod accuracy;
 pub mod args;
@@ -22,6 +23,7 @@ pub mod form_factors;
 pub mod growth;
 pub mod irradiance;
 pub mod measure;
+pub mod paper;
 pub mod plot;
 pub mod run;
 pub mod threads;

@@ -3,7 +3,7 @@
 
 use clap::ValueEnum;
 use glam::Vec3;
-use glossy_ext::{GlossyField, Incident, Place, Reflector, arriving};
+use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector, arriving};
 use hr_diffuse::{LightField, NodeId, Rgb, Solution};
 use std::f32::consts::FRAC_1_PI;
 
@@ -27,7 +27,7 @@ pub enum Mode {
 ///
 /// The leaf's distribution is that of its own normal. What the place reflects toward `away` comes from the mirrored
 /// direction; the leaf reflects the same toward another one, which is where its distribution is asked.
-fn leaving(solution: &Solution<GlossyField>, leaf: NodeId, normal: Vec3, away: Vec3) -> (Rgb, f32) {
+fn leaving<B: Basis>(solution: &Solution<GlossyField<B>>, leaf: NodeId, normal: Vec3, away: Vec3) -> (Rgb, f32) {
     let element = &solution.elements.nodes[leaf.index()];
     let axis = element.normals.axis;
     let mirrored = away.reflect(normal);
@@ -43,13 +43,16 @@ fn leaving(solution: &Solution<GlossyField>, leaf: NodeId, normal: Vec3, away: V
 }
 
 /// Radiance of a leaf without a distribution, whose glossy light is carried as diffuse light.
-pub(crate) fn carried(solution: &Solution<GlossyField>, leaf: NodeId) -> Rgb {
+pub(crate) fn carried<B: Basis>(solution: &Solution<GlossyField<B>>, leaf: NodeId) -> Rgb {
     let albedo = solution.field.active(solution.elements.nodes[leaf.index()].material).unwrap_or(Rgb::ZERO);
     solution.exitant.irradiance[leaf.index()] * albedo * FRAC_1_PI
 }
 
 /// The leaves around some vertices and their shares, some more than once. What lies below something is not seen.
-pub(crate) fn shares(solution: &Solution<GlossyField>, corners: &[(u32, f32)]) -> impl Iterator<Item = (u32, f32)> {
+pub(crate) fn shares<B: Basis>(
+    solution: &Solution<GlossyField<B>>,
+    corners: &[(u32, f32)],
+) -> impl Iterator<Item = (u32, f32)> {
     corners.iter().filter(|(_, share)| *share > 0.0).flat_map(move |&(vertex, share)| {
         let around = solution.vertices.leaves_around(vertex);
         around.iter().map(move |&leaf| (leaf, solution.elements.exposed(leaf) * share / around.len() as f32))
@@ -59,7 +62,12 @@ pub(crate) fn shares(solution: &Solution<GlossyField>, corners: &[(u32, f32)]) -
 /// Radiance from the distributions around some vertices of a leaf, interpolated with the weights given (paper, section
 /// 5.2), at a place with the unit normal given, in the unit direction `away`.
 #[must_use]
-pub fn interpolated(solution: &Solution<GlossyField>, corners: &[(u32, f32)], normal: Vec3, away: Vec3) -> Rgb {
+pub fn interpolated<B: Basis>(
+    solution: &Solution<GlossyField<B>>,
+    corners: &[(u32, f32)],
+    normal: Vec3,
+    away: Vec3,
+) -> Rgb {
     let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
     for (leaf, share) in shares(solution, corners) {
         let (light, weight) = leaving(solution, NodeId(leaf), normal, away);
@@ -73,8 +81,8 @@ pub fn interpolated(solution: &Solution<GlossyField>, corners: &[(u32, f32)], no
 /// in the unit direction `away`. Senders count as at least so wide (radians): too narrow a lobe would show them one
 /// by one. Light that is not finite, of a reflector that misbehaves, is 0. `scratch` saves an allocation.
 #[must_use]
-pub fn reflected(
-    solution: &Solution<GlossyField>,
+pub fn reflected<B: Basis>(
+    solution: &Solution<GlossyField<B>>,
     reflector: &dyn Reflector,
     leaf: NodeId,
     place: &Place,

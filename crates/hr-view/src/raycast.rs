@@ -7,7 +7,8 @@
 use crate::glossy::{self, Mode};
 use crate::path_tracer::{PathTracer, Ray};
 use glam::{DVec3, Vec2, Vec3};
-use glossy_ext::{GlossyField, Incident, Place, Reflector};
+use glossy_ext::haar::Haar;
+use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2, unit};
 use hr_diffuse::{Hit, NodeId, Rgb, Solution};
@@ -33,11 +34,11 @@ const WIDE: f32 = 16.0;
 /// Rays start this far from their surface (unit space): what rounding needs.
 const START: f32 = 1e-6;
 
-/// Renders a solution.
+/// Renders a solution, whatever basis its distributions are in.
 #[derive(Debug)]
-pub struct RayCaster<'a> {
+pub struct RayCaster<'a, B: Basis = Haar> {
     scene: &'a Scene,
-    solution: &'a Solution<GlossyField>,
+    solution: &'a Solution<GlossyField<B>>,
     mode: Mode,
     /// Rays per pixel are this squared.
     grid: u32,
@@ -56,10 +57,10 @@ struct Met {
     reflector: Arc<dyn Reflector>,
 }
 
-impl<'a> RayCaster<'a> {
+impl<'a, B: Basis> RayCaster<'a, B> {
     /// For a scene and its solution.
     #[must_use]
-    pub fn new(scene: &'a Scene, solution: &'a Solution<GlossyField>, mode: Mode) -> Self {
+    pub fn new(scene: &'a Scene, solution: &'a Solution<GlossyField<B>>, mode: Mode) -> Self {
         let tracer = (mode == Mode::Gather).then(|| PathTracer::new(scene, &solution.scene.visibility));
         Self { scene, solution, mode, grid: 3, tracer }
     }

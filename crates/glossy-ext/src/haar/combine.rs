@@ -2,9 +2,9 @@
 
 use super::mesh::{Mesh, Midpoint, NO_VERTEX};
 use super::project::Variation;
-use super::triangle::{child_corners, midpoints};
 use super::{Haar, Node, Refinement};
 use crate::Rgb;
+use crate::basis::triangle::{child_corners, midpoints};
 
 impl Haar {
     /// The sum of two distributions on the union of their subdivisions.

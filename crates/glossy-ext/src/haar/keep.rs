@@ -1,7 +1,7 @@
 //! Distributions as flat arrays, and from them again.
 
-use super::half::Half3;
 use super::{Haar, MAX_LEVEL, Node};
+use crate::basis::half::Half3;
 use hr_diffuse::flat::{FlatError, Reader, Writer, fits};
 use hr_diffuse::threads::prelude::*;
 use std::io;

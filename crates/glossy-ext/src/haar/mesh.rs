@@ -4,10 +4,10 @@
 //! level exist, so what is coarser beside it is subdivided first. Neighbours are found by following indices; there
 //! is no search and no hashing.
 
-use super::half::{encode, scale_for};
-use super::triangle::{EDGE_ENDS, Triangle, child_corners, midpoints};
 use super::{Haar, Node};
 use crate::Rgb;
+use crate::basis::half::{encode, scale_for};
+use crate::basis::triangle::{EDGE_ENDS, Triangle, child_corners, midpoints};
 use glam::Vec3;
 
 /// No vertex at this midpoint.
@@ -276,7 +276,7 @@ impl Tri {
 
 #[cfg(test)]
 mod tests {
-    use super::super::triangle::face_corners;
+    use super::super::face_corners;
     use super::*;
 
     #[test]

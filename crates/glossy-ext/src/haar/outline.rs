@@ -1,8 +1,8 @@
 //! A distribution taken apart, for files and for other programs that show it.
 
-use super::triangle::{EDGE_ENDS, child_corners};
 use super::{Haar, Node};
 use crate::Rgb;
+use crate::basis::triangle::{EDGE_ENDS, child_corners};
 
 /// All that a distribution consists of, in an order in which it can be put together again without any index: triangles
 /// level by level, vertices as they are met.
@@ -85,7 +85,7 @@ mod tests {
         let axis = Vec3::new(0.3, -0.2, 0.9).normalize();
         let lobe = |d: Vec3| Vec3::new(1.0, 0.5, 0.1) * d.dot(axis).max(0.0).powi(150) + 0.01 * d.x.abs();
         let peaks = [Peak { direction: axis, width: 0.1 }];
-        let haar = Haar::project(&Refinement::default(), &Known { peaks: &peaks, ..Known::NOTHING }, lobe).haar;
+        let haar = Haar::project(&Refinement::default(), &Known { peaks: &peaks, ..Known::NOTHING }, lobe).distribution;
         let Outline { faces, children, values, ends } = haar.outline();
         assert_eq!(values.len(), haar.vertices.len(), "every vertex once");
         assert_eq!(values.len(), ends.len() + 6, "an edge for every midpoint");

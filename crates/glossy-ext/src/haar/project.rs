@@ -1,9 +1,10 @@
 //! Top-down projection (paper, section 4.2).
 
 use super::mesh::{Mesh, Midpoint, NO_VERTEX, Tri};
-use super::triangle::{ConeTest, Triangle, midpoints};
 use super::{Haar, MAX_LEVEL, MAX_UNIFORM_LEVEL};
 use crate::Rgb;
+use crate::basis::triangle::{ConeTest, Triangle, midpoints};
+use crate::basis::{Known, Peak, Projected, Sampler, Support};
 use glam::Vec3;
 use hr_diffuse::Cone;
 
@@ -91,112 +92,6 @@ pub(super) struct Variation {
     pub(super) deviation: f32,
 }
 
-/// What the function is taken to be where it is known to vanish, in the triangles that straddle the border.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Beyond {
-    /// Zero. Right for functions that fall to zero at the border, such as the intensity of a flat surface; a step
-    /// there is smeared over the width of a triangle.
-    Zero,
-    /// As on the border's nearest point, where the function is evaluated. Right for functions with a step at the
-    /// border, such as the radiance of a surface, that are never looked up beyond it.
-    Continued,
-}
-
-/// Where the function is not zero.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Support {
-    /// The directions where the function is evaluated, and no others.
-    pub cone: Cone,
-    /// What to interpolate with outside.
-    pub beyond: Beyond,
-}
-
-/// A direction in which a narrow lobe points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Peak {
-    /// Unit direction of its middle.
-    pub direction: Vec3,
-    /// Angle in radians from the middle within which triangles are made no larger than this angle.
-    pub width: f32,
-}
-
-/// What is known of a function before it is sampled.
-#[derive(Clone, Copy, Debug)]
-pub struct Known<'a> {
-    /// Where it is not zero, if not everywhere.
-    pub support: Option<Support>,
-    /// What is added to the middle value in the relative test: the diffuse radiance beside which glossy detail is
-    /// negligible. In the unit of the function.
-    pub offset: Rgb,
-    /// Where lobes point, lest they be missed between the samples.
-    pub peaks: &'a [Peak],
-}
-
-impl Known<'_> {
-    /// Nothing: the whole sphere, no offset, no peaks.
-    pub const NOTHING: Known<'static> = Known { support: None, offset: Rgb::ZERO, peaks: &[] };
-}
-
-/// A projection and what it took.
-#[derive(Clone, Debug)]
-pub struct Projected {
-    /// The distribution.
-    pub haar: Haar,
-    /// How often the function was evaluated.
-    pub evaluations: usize,
-    /// How many of its values were infinite or not a number, and were replaced by 0.
-    pub not_finite: usize,
-    /// Whether refinement stopped because a distribution cannot be larger.
-    pub truncated: bool,
-}
-
-/// The function, called only where it should be.
-struct Sampler<'a, F> {
-    f: F,
-    support: Option<&'a Support>,
-    evaluations: usize,
-    not_finite: usize,
-    /// Largest component met so far.
-    largest: f32,
-}
-
-impl<F: FnMut(Vec3) -> Rgb> Sampler<'_, F> {
-    fn is_inside(&self, position: Vec3) -> bool {
-        self.support.is_none_or(|s| contains(&s.cone, position))
-    }
-
-    /// The value for any position on the octahedron or direction.
-    fn at(&mut self, position: Vec3) -> Rgb {
-        let mut direction = position.normalize();
-        if let Some(support) = self.support.filter(|_| !self.is_inside(direction)) {
-            match support.beyond {
-                Beyond::Zero => return Rgb::ZERO,
-                Beyond::Continued => direction = onto_border(&support.cone, direction),
-            }
-        }
-        self.evaluations += 1;
-        let value = (self.f)(direction);
-        if !value.is_finite() {
-            self.not_finite += 1;
-            return Rgb::ZERO;
-        }
-        self.largest = self.largest.max(value.abs().max_element());
-        value
-    }
-}
-
-/// Whether a direction of any length is in a cone.
-fn contains(cone: &Cone, direction: Vec3) -> bool {
-    cone.axis.dot(direction) >= cone.cos_angle * direction.length()
-}
-
-/// The direction of a cone's border nearest to one outside.
-fn onto_border(cone: &Cone, direction: Vec3) -> Vec3 {
-    let aside = (direction - cone.axis * cone.axis.dot(direction)).normalize_or(cone.axis.any_orthonormal_vector());
-    let cos = cone.cos_angle.clamp(-1.0, 1.0);
-    (cone.axis * cos + aside * (1.0 - cos * cos).max(0.0).sqrt()).normalize()
-}
-
 /// A peak made ready: the cone about it and the level down to which that is refined.
 fn peak_test(peak: &Peak, max_level: u8) -> Option<(ConeTest, u8)> {
     if !peak.direction.is_finite() || peak.direction == Vec3::ZERO {
@@ -222,14 +117,14 @@ impl Haar {
     /// many triangles share them. Values that are not finite count as 0.
     ///
     /// Depends on nothing but the arguments: the same function gives the same distribution, bit by bit.
-    pub fn project(settings: &Refinement, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected {
+    pub fn project(settings: &Refinement, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected<Self> {
         let (min_level, max_level) = (settings.min_level(), settings.max_level());
         let support = known.support.as_ref();
         let within = support.map(|s| ConeTest::new(&s.cone));
         let peaks: Vec<_> = known.peaks.iter().filter_map(|p| peak_test(p, max_level)).collect();
         let peak_level = peaks.iter().map(|p| p.1).max().unwrap_or(0);
 
-        let mut sampler = Sampler { f, support, evaluations: 0, not_finite: 0, largest: 0.0 };
+        let mut sampler = Sampler::new(f, support);
         let mut mesh = Mesh::new(|p| sampler.at(p));
         let mut findings = vec![Finding::default(); mesh.tris.len()];
         let mut truncated = false;
@@ -269,8 +164,7 @@ impl Haar {
         if settings.preserve_energy {
             keep_means(&mut mesh, &findings, support);
         }
-        let Sampler { evaluations, not_finite, .. } = sampler;
-        Projected { haar: mesh.pack(), evaluations, not_finite, truncated }
+        Projected { truncated, ..sampler.projected(mesh.pack()) }
     }
 }
 
@@ -328,7 +222,7 @@ fn inherit(mesh: &Mesh, findings: &mut Vec<Finding>) {
 /// mean is that of the interpolation plus 3/4 of what it lacks in the middle. The same holds for a triangle with
 /// some midpoints on its edges, each of which takes 3/4 of its edge's share from both.
 fn keep_means(mesh: &mut Mesh, findings: &[Finding], support: Option<&Support>) {
-    let outside = |p: Vec3| support.is_some_and(|s| !contains(&s.cone, p));
+    let outside = |p: Vec3| support.is_some_and(|s| !s.contains(p));
     let means: Vec<Option<Rgb>> = std::iter::zip(&mesh.tris, findings)
         .map(|(tri, finding)| {
             // The mean of a triangle that the border cuts is not known from its samples.

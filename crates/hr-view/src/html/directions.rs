@@ -120,7 +120,7 @@ mod tests {
         let axis = Vec3::new(0.3, 0.5, 0.8).normalize();
         let lobe = |d: Vec3| Rgb::new(2.0, 1.0, 0.5) * d.dot(axis).max(0.0).powi(80) + 0.1 * (1.0 + d.z);
         let peaks = [Peak { direction: axis, width: 0.1 }];
-        let haar = Haar::project(&Refinement::default(), &Known { peaks: &peaks, ..Known::NOTHING }, lobe).haar;
+        let haar = Haar::project(&Refinement::default(), &Known { peaks: &peaks, ..Known::NOTHING }, lobe).distribution;
         let shine = |haar| Shine { haar, beside: Rgb::ZERO };
         let counts = TOLERANCES.map(|tolerance| coarse(&shine(&haar), tolerance, 1.0).values.len());
         assert!(counts.is_sorted_by(|a, b| a >= b) && counts[0] > 2 * counts[4], "coarser and coarser: {counts:?}");

@@ -57,7 +57,7 @@ pub(super) fn add(
         .map(|&leaf| {
             let light = solution.reflected[leaf.index()].is_empty().then(|| glossy::carried(solution, leaf))?;
             let settings = Refinement { min_level: 0, ..Refinement::default() };
-            Some(Haar::project(&settings, &Known::NOTHING, |_| light).haar)
+            Some(Haar::project(&settings, &Known::NOTHING, |_| light).distribution)
         })
         .collect();
     let is_radiance = |(&leaf, even): (&NodeId, &Option<Haar>)| u8::from(element(leaf).is_flat() || even.is_some());

@@ -7,7 +7,7 @@
 use crate::Rgb;
 
 /// One stored value: three half floats.
-pub(super) type Half3 = [u16; 3];
+pub(crate) type Half3 = [u16; 3];
 
 /// The stored number that the largest component of a distribution is mapped to: the largest power of two of
 /// binary16, so that scaling is exact for it.
@@ -23,7 +23,7 @@ const REBIAS: f32 = f32::from_bits((127 + 112) << 23);
 const UNBIAS: f32 = f32::from_bits((127 - 112) << 23);
 
 /// The scale for values with this largest component, 0 if that is too small for any value to be told from zero.
-pub(super) fn scale_for(largest: f32) -> f32 {
+pub(crate) fn scale_for(largest: f32) -> f32 {
     let scale = largest / TOP;
     // Below this, 1/scale overflows.
     if scale < f32::MIN_POSITIVE { 0.0 } else { scale }
@@ -48,14 +48,14 @@ fn decode_one(stored: u16) -> f32 {
 }
 
 /// Stores a value in units of `scale`; relative rounding error 2⁻¹¹ per component.
-pub(super) fn encode(value: Rgb, scale: f32) -> Half3 {
+pub(crate) fn encode(value: Rgb, scale: f32) -> Half3 {
     let v = value / scale;
     [encode_one(v.x), encode_one(v.y), encode_one(v.z)]
 }
 
 /// The stored value, still in units of the scale.
 #[inline]
-pub(super) fn decode(stored: Half3) -> Rgb {
+pub(crate) fn decode(stored: Half3) -> Rgb {
     Rgb::new(decode_one(stored[0]), decode_one(stored[1]), decode_one(stored[2]))
 }
 
