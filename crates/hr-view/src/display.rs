@@ -4,6 +4,7 @@
 //! vertex and never computed again; radiance that follows the eye is asked for, vertex by vertex, with
 //! [`Walkable::glossy_radiance`].
 
+use crate::camera_path::CameraPath;
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::Rgb;
 use hr_scene::{Camera, Primaries, Texture};
@@ -168,6 +169,11 @@ pub trait Walkable: Send + Sync {
 
     /// Named cameras, in the order of the digit keys; may be empty.
     fn cameras(&self) -> &[(String, Camera)];
+
+    /// A walk to play; empty where there is none.
+    fn tour(&self) -> CameraPath {
+        CameraPath::default()
+    }
 
     /// The direction that stays up while walking, unit length: by default the coordinate axis nearest to the first
     /// camera's up, and z without a camera.

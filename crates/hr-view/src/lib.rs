@@ -2,6 +2,7 @@
 
 pub mod app;
 pub mod args;
+pub mod camera_path;
 pub mod display;
 pub mod error;
 pub mod facets;
@@ -11,10 +12,12 @@ pub mod interrupt;
 pub mod path_tracer;
 pub mod progress;
 pub mod raycast;
+mod session;
 pub mod solution_file;
 pub mod solved;
 pub mod stats;
 pub mod walkthrough;
+mod watched;
 pub mod window;
 
 pub use args::{Args, Parsed};

@@ -1,5 +1,6 @@
 //! A solution, ready to be walked through.
 
+use crate::camera_path::CameraPath;
 use crate::display::{DisplayMesh, Walkable};
 use crate::facets::{Roundness, Source, facets};
 use crate::glossy::{self, Mode};
@@ -14,21 +15,25 @@ use std::sync::Arc;
 /// in light transport, and so that a highlight between two vertices does not vanish.
 const NARROWEST: f32 = 0.03;
 
+/// The scene's own walk, as it is played: so many cameras in so many seconds.
+const TOUR_CAMERAS: usize = 120;
+const TOUR_SECONDS: f64 = 24.0;
+
 /// A solution as triangles, with the light that follows the eye.
 #[derive(Debug)]
-pub struct Walkthrough<'a> {
-    solved: &'a Solved,
+pub struct Walkthrough {
+    solved: Arc<Solved>,
     mode: Mode,
     mesh: DisplayMesh,
     /// Per entry of the mesh's `glossy`.
     sources: Vec<Source>,
 }
 
-impl<'a> Walkthrough<'a> {
+impl Walkthrough {
     /// Makes the triangles. With [`Mode::Samples`] glossy light is that of the illumination samples, reflected at each
     /// vertex; perfect mirrors, which samples cannot show, keep their distributions.
     #[must_use]
-    pub fn new(solved: &'a Solved, mode: Mode) -> Self {
+    pub fn new(solved: Arc<Solved>, mode: Mode) -> Self {
         let (mesh, sources) = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
         Self { solved, mode, mesh, sources }
     }
@@ -57,7 +62,7 @@ impl<'a> Walkthrough<'a> {
     }
 }
 
-impl Walkable for Walkthrough<'_> {
+impl Walkable for Walkthrough {
     fn name(&self) -> &str {
         &self.solved.scene.name
     }
@@ -68,6 +73,10 @@ impl Walkable for Walkthrough<'_> {
 
     fn cameras(&self) -> &[(String, Camera)] {
         &self.solved.scene.cameras
+    }
+
+    fn tour(&self) -> CameraPath {
+        CameraPath::through(&self.solved.scene.walkthrough(TOUR_CAMERAS), TOUR_SECONDS)
     }
 
     fn glossy_radiance(&self, eye: DVec3, vertices: &[u32], out: &mut [Rgb]) {

@@ -3,8 +3,9 @@
 use super::WindowError;
 use super::gpu::{Gpu, one_line};
 use super::lists::split;
-use super::refresh::Refresh;
-use super::scene_buffers::{Frame, Pass, SceneBuffers};
+use super::pipelines::{Layouts, Pass};
+use super::scene_buffers::{Frame, SceneBuffers};
+use super::shown::Shown;
 use super::tone::Tone;
 use super::view::View;
 use crate::display::Walkable;
@@ -35,22 +36,20 @@ impl Snapshot {
         let mesh = walk.mesh();
         mesh.check()?;
         let gpu = Gpu::new()?;
-        let lists = split(mesh);
-        let scene = SceneBuffers::new(&gpu, mesh, &lists)?;
+        let layouts = Layouts::new(&gpu);
         let size = [camera.width.max(1), camera.height.max(1)];
         let view = View::of_camera(camera);
-        let mut refresh = Refresh::new(walk, &lists[1]);
-        let sight = view.sight(mesh.origin, f64::from(size[0]) / f64::from(size[1]));
-        refresh.update(walk, &lists[1], view.eye, &sight, 0.0);
-        scene.set_glossy(&gpu, refresh.radiance());
+        let mut shown = Shown::new(&gpu, &layouts, walk, split(mesh))?;
+        shown.follow(&gpu, walk, &view, size, 0.0);
         let automatic = Tone::for_mesh(mesh);
         let frame = Frame { view: &view, tone: tone.unwrap_or(&automatic), mesh };
-        Self::draw(&gpu, &scene, size, &frame)
+        Self::draw(&gpu, &layouts, &shown.buffers, size, &frame)
     }
 
     /// Draws one frame into memory.
     pub(super) fn draw(
         gpu: &Gpu,
+        layouts: &Layouts,
         scene: &SceneBuffers,
         [width, height]: [u32; 2],
         frame: &Frame<'_>,
@@ -80,7 +79,7 @@ impl Snapshot {
         });
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Pass::new(gpu, scene, format, gpu.samples(format)).draw(
+        Pass::new(gpu, layouts, format, gpu.samples(format)).draw(
             gpu,
             scene,
             &mut encoder,
