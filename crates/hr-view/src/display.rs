@@ -5,6 +5,7 @@
 //! [`Walkable::glossy_radiance`].
 
 use crate::camera_path::CameraPath;
+use crate::inside::Inside;
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::Rgb;
 use hr_scene::{Camera, Primaries, Texture};
@@ -173,6 +174,11 @@ pub trait Walkable: Send + Sync {
     /// A walk to play; empty where there is none.
     fn tour(&self) -> CameraPath {
         CameraPath::default()
+    }
+
+    /// What lies behind the picture, where it can be looked into.
+    fn inside(&self) -> Option<Box<dyn Inside + '_>> {
+        None
     }
 
     /// The direction that stays up while walking, unit length: by default the coordinate axis nearest to the first

@@ -27,7 +27,7 @@ pub enum Mode {
 ///
 /// The leaf's distribution is that of its own normal. What the place reflects toward `away` comes from the mirrored
 /// direction; the leaf reflects the same toward another one, which is where its distribution is asked.
-fn leaving(solution: &Solution<GlossyField>, leaf: NodeId, normal: Vec3, away: Vec3) -> (Rgb, f32) {
+pub(crate) fn leaving(solution: &Solution<GlossyField>, leaf: NodeId, normal: Vec3, away: Vec3) -> (Rgb, f32) {
     let element = &solution.elements.nodes[leaf.index()];
     let axis = element.normals.axis;
     let mirrored = away.reflect(normal);

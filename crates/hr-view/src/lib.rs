@@ -8,6 +8,7 @@ pub mod error;
 pub mod facets;
 pub mod glossy;
 pub mod html;
+pub mod inside;
 pub mod interrupt;
 pub mod path_tracer;
 pub mod progress;

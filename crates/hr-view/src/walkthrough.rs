@@ -4,6 +4,7 @@ use crate::camera_path::CameraPath;
 use crate::display::{DisplayMesh, Walkable};
 use crate::facets::{Roundness, Source, facets};
 use crate::glossy::{self, Mode};
+use crate::inside::{Anatomy, Inside};
 use crate::solved::Solved;
 use glam::{DVec3, Vec3};
 use glossy_ext::{Incident, Place};
@@ -77,6 +78,10 @@ impl Walkable for Walkthrough {
 
     fn tour(&self) -> CameraPath {
         CameraPath::through(&self.solved.scene.walkthrough(TOUR_CAMERAS), TOUR_SECONDS)
+    }
+
+    fn inside(&self) -> Option<Box<dyn Inside + '_>> {
+        Some(Box::new(Anatomy { solved: &self.solved, origin: self.mesh.origin }))
     }
 
     fn glossy_radiance(&self, eye: DVec3, vertices: &[u32], out: &mut [Rgb]) {

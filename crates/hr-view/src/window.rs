@@ -4,11 +4,14 @@
 //! happen per pixel.
 
 mod app;
+mod gauge;
 mod gpu;
 mod hud;
 mod input;
 pub(crate) mod lists;
 mod live;
+mod looking;
+mod overlay;
 mod pipelines;
 mod refresh;
 mod scene_buffers;

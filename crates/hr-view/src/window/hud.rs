@@ -1,5 +1,6 @@
 //! Text and controls over the picture.
 
+use super::gauge::{DECADES, Gauge, Quantity, color};
 use super::gpu::Gpu;
 use super::input::HELP;
 use super::screen::Status;
@@ -10,6 +11,10 @@ use winit::window::Window;
 
 /// How long a message stays.
 const MESSAGE: Duration = Duration::from_secs(4);
+
+/// Size of the scale of false colours in points, and of how many bars it is made.
+const LEGEND: egui::Vec2 = egui::vec2(300.0, 14.0);
+const LEGEND_STEPS: u16 = 100;
 
 /// What the lines at the top tell.
 pub(super) struct Facts<'a> {
@@ -26,6 +31,9 @@ pub(super) struct Facts<'a> {
     pub(super) frame: Duration,
     pub(super) device: &'a str,
     pub(super) status: &'a Status,
+    /// Figures of the point that was picked.
+    pub(super) inside: &'a [String],
+    pub(super) gauge: Gauge,
 }
 
 /// What the help's controls change.
@@ -92,6 +100,12 @@ impl Hud {
             let context = ui.ctx().clone();
             if show_lines {
                 lines(&context, facts, settings);
+            }
+            if !facts.inside.is_empty() {
+                label(&context, "inside", Align2::RIGHT_TOP, [-8.0, 8.0], &facts.inside.join("\n"));
+            }
+            if facts.gauge.quantity != Quantity::Picture {
+                legend(&context, facts.gauge);
             }
             if let Some(text) = message {
                 label(&context, "message", Align2::CENTER_BOTTOM, [0.0, -16.0], text);
@@ -192,6 +206,51 @@ fn solving(status: &Status) -> String {
     format!("{paused}{activity}   {:.0} %   {asked}{shown}", percent(status.fraction))
 }
 
+/// The scale of false colours.
+fn legend(context: &egui::Context, gauge: Gauge) {
+    egui::Area::new(egui::Id::unique("legend")).anchor(Align2::LEFT_BOTTOM, [8.0, -8.0]).interactable(false).show(
+        context,
+        |ui| {
+            backdrop().show(ui, |ui| {
+                let text = |ui: &mut egui::Ui, text: String| ui.label(RichText::new(text).color(Color32::WHITE));
+                text(ui, gauge.quantity.label().to_owned());
+                let (place, _) = ui.allocate_exact_size(LEGEND, egui::Sense::hover());
+                let width = place.width() / f32::from(LEGEND_STEPS);
+                for step in 0..LEGEND_STEPS {
+                    let left = place.left() + width * f32::from(step);
+                    let size = egui::vec2(width + 0.5, place.height());
+                    let bar = egui::Rect::from_min_size(egui::pos2(left, place.top()), size);
+                    let share = (f32::from(step) + 0.5) / f32::from(LEGEND_STEPS);
+                    let [r, g, b] = color(share);
+                    ui.painter().rect_filled(bar, 0.0, egui::Rgba::from_rgb(r, g, b));
+                }
+                ui.horizontal(|ui| {
+                    ui.set_width(place.width());
+                    ui.columns(4, |columns| {
+                        for (i, column) in (0_u8..).zip(columns) {
+                            let value = gauge.high * 10_f32.powf(f32::from(i) - DECADES);
+                            text(column, short(value));
+                        }
+                    });
+                });
+            });
+        },
+    );
+}
+
+/// A number on a scale, short.
+fn short(value: f32) -> String {
+    if (1e-3..1e5).contains(&value) {
+        let digits = (2.0 - value.log10().floor()).clamp(0.0, 6.0);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0…6")]
+        let text = format!("{value:.*}", digits as usize);
+        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        text.to_owned()
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
 fn help(context: &egui::Context, facts: &Facts<'_>, settings: &mut Settings, open: &mut bool) {
     let window = egui::Window::new("Help").open(open).collapsible(false).resizable(false);
     window.anchor(Align2::CENTER_CENTER, [0.0, 0.0]).show(context, |ui| {
@@ -219,4 +278,18 @@ fn help(context: &egui::Context, facts: &Facts<'_>, settings: &mut Settings, ope
         ui.separator();
         ui.label(RichText::new(format!("{} vertices · {}", facts.vertices, facts.device)).weak());
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        let cases =
+            [(5000.0, "5000"), (0.05, "0.05"), (1.5, "1.5"), (2e7, "2.0e7"), (1e-5, "1.0e-5"), (0.0123, "0.0123")];
+        for (value, text) in cases {
+            assert_eq!(short(value), text, "{value}");
+        }
+    }
 }

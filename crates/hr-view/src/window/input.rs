@@ -21,7 +21,7 @@ const CAMERA_KEYS: [KeyCode; 10] = [
 ];
 
 /// Keys and what they do, as the help shows them.
-pub(super) const HELP: [(&str, &str); 17] = [
+pub(super) const HELP: [(&str, &str); 22] = [
     ("W A S D, arrows up, down", "walk"),
     ("E Q, space shift", "up, down"),
     ("drag, arrows left, right", "look around"),
@@ -33,18 +33,24 @@ pub(super) const HELP: [(&str, &str); 17] = [
     ("X", "stop solving, show what there is"),
     ("R", "record a walk, end and save it"),
     ("V", "play the walk, or the scene's own"),
+    ("click", "look inside a point: figures, samples, links, radiance"),
+    ("L", "show or hide the links of the point"),
+    ("M", "outlines of elements"),
+    ("B", "boxes of clusters, level by level"),
+    ("G", "false colours: radiance, radiosity, irradiance"),
     ("+ −", "brighter, darker"),
     ("backspace", "automatic exposure"),
     ("F", "save a screenshot"),
     ("T", "show or hide the lines at the top"),
     ("H", "this help"),
-    ("Esc", "quit"),
+    ("Esc", "leave the point, quit"),
 ];
 
 /// What a key asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Command {
-    Quit,
+    /// Leave what one is in; at last the window.
+    Leave,
     /// Brighter by so many stops, darker where negative.
     Expose(f32),
     AutomaticExposure,
@@ -56,6 +62,10 @@ pub(super) enum Command {
     Solve(Wish),
     Record,
     Play,
+    Links,
+    Elements,
+    Clusters,
+    Gauge,
 }
 
 /// The command of a key; `repeat` where it is held down.
@@ -66,7 +76,7 @@ pub(super) fn command(code: KeyCode, key: &Key, repeat: bool) -> Option<Command>
         _ => "",
     };
     Some(match (code, printed) {
-        _ if *key == Key::Named(NamedKey::Escape) => Command::Quit,
+        _ if *key == Key::Named(NamedKey::Escape) => Command::Leave,
         (_, "+" | "=") => Command::Expose(STOPS),
         (_, "-" | "_") => Command::Expose(-STOPS),
         (KeyCode::Backspace, _) => Command::AutomaticExposure,
@@ -77,6 +87,10 @@ pub(super) fn command(code: KeyCode, key: &Key, repeat: bool) -> Option<Command>
         (KeyCode::KeyX, _) => Command::Solve(Wish::Stop),
         (KeyCode::KeyR, _) => Command::Record,
         (KeyCode::KeyV, _) => Command::Play,
+        (KeyCode::KeyL, _) => Command::Links,
+        (KeyCode::KeyM, _) => Command::Elements,
+        (KeyCode::KeyB, _) => Command::Clusters,
+        (KeyCode::KeyG, _) => Command::Gauge,
         (KeyCode::KeyH | KeyCode::F1, _) => Command::Help,
         (KeyCode::KeyT, _) => Command::Lines,
         (KeyCode::KeyF | KeyCode::F12, _) => Command::Screenshot,

@@ -1,8 +1,10 @@
 //! The open window: events in, frames out.
 
+use super::gauge::Gauge;
 use super::gpu::Gpu;
 use super::hud::{Facts, Hud, Settings};
 use super::input::{Command, command};
+use super::looking::Looking;
 use super::pipelines::{Layouts, Pass};
 use super::scene_buffers::Frame;
 use super::screen::{News, Prepared, Status, Wish};
@@ -29,6 +31,9 @@ const CAPTURED_TURN: f64 = 0.0022;
 /// Pixels of a touchpad's scrolling that count as one notch of a wheel.
 const NOTCH: f64 = 40.0;
 
+/// A mouse that is moved by no more pixels between press and release clicks.
+const STILL: f64 = 3.0;
+
 /// Whether to go on.
 pub(super) enum Next {
     Go,
@@ -40,6 +45,8 @@ pub(super) enum Next {
 enum Mouse {
     Free,
     /// The left button is down.
+    Pressed,
+    /// And the mouse has been moved since.
     Dragging,
     Captured,
 }
@@ -55,6 +62,8 @@ pub(super) struct Live {
     walk: Arc<dyn Walkable>,
     shown: Shown,
     automatic: Tone,
+    gauge: Gauge,
+    looking: Looking,
     hud: Hud,
     settings: Settings,
     status: Status,
@@ -65,6 +74,8 @@ pub(super) struct Live {
     mouse: Mouse,
     /// Where the cursor was last, in pixels.
     cursor: Option<PhysicalPosition<f64>>,
+    /// Where it was when the left button went down.
+    pressed: Option<PhysicalPosition<f64>>,
     /// When the last frame began, while something moves.
     last_frame: Option<Instant>,
     frame_time: Duration,
@@ -104,10 +115,13 @@ impl Live {
             wishes: options.wishes.clone(),
             tour: Tour::new(options.path.clone(), options.path_file.clone()),
             automatic: tone,
+            gauge: Gauge::OFF,
+            looking: Looking::default(),
             camera: None,
             walker,
             mouse: Mouse::Free,
             cursor: None,
+            pressed: None,
             last_frame: None,
             frame_time: Duration::ZERO,
             again: None,
@@ -180,7 +194,8 @@ impl Live {
         }
         self.window.set_title(&title(walk.name(), &self.status));
         self.walk = walk;
-        Ok(())
+        self.gauge.high = self.gauge.quantity.high(self.walk.mesh());
+        self.looking.update(&self.gpu, self.walk.as_ref())
     }
 
     pub(super) fn window_event(&mut self, event: &WindowEvent) -> Result<Next, WindowError> {
@@ -215,9 +230,9 @@ impl Live {
                     return self.command(command);
                 }
             }
-            WindowEvent::MouseInput { state, button, .. } => self.mouse_button(*state, *button, taken),
+            WindowEvent::MouseInput { state, button, .. } => self.mouse_button(*state, *button, taken)?,
             WindowEvent::CursorMoved { position, .. } => self.drag(*position),
-            WindowEvent::CursorLeft { .. } if self.mouse != Mouse::Dragging => self.cursor = None,
+            WindowEvent::CursorLeft { .. } if matches!(self.mouse, Mouse::Free | Mouse::Captured) => self.cursor = None,
             WindowEvent::MouseWheel { delta, .. } if !taken => {
                 self.walker.change_speed(match delta {
                     MouseScrollDelta::LineDelta(_, y) => f64::from(*y),
@@ -235,7 +250,8 @@ impl Live {
     fn command(&mut self, command: Command) -> Result<Next, WindowError> {
         let stops = self.settings.stops;
         match command {
-            Command::Quit => return Ok(Next::Quit),
+            Command::Leave if self.looking.leave() => self.look()?,
+            Command::Leave => return Ok(Next::Quit),
             Command::Expose(more) => self.settings.stops = (stops + more).clamp(-30.0, 30.0),
             Command::AutomaticExposure => self.settings.stops = 0.0,
             Command::Help => self.hud.show_help = !self.hud.show_help,
@@ -249,6 +265,23 @@ impl Live {
                 let said = self.tour.record(Instant::now(), camera);
                 self.hud.say(said);
             }
+            Command::Links => {
+                self.looking.toggle_links();
+                self.look()?;
+            }
+            Command::Elements => {
+                self.looking.toggle_elements();
+                self.look()?;
+            }
+            Command::Clusters => {
+                let said = self.looking.next_clusters(self.walk.as_ref());
+                self.hud.say(said);
+                self.look()?;
+            }
+            Command::Gauge => {
+                let quantity = self.gauge.quantity.next();
+                self.gauge = Gauge { quantity, high: quantity.high(self.walk.mesh()) };
+            }
             Command::Play => {
                 let said = self.tour.play(Instant::now());
                 self.hud.say(said);
@@ -256,6 +289,12 @@ impl Live {
         }
         self.window.request_redraw();
         Ok(Next::Go)
+    }
+
+    /// Draws what is seen of the inside anew.
+    fn look(&mut self) -> Result<(), WindowError> {
+        self.window.request_redraw();
+        self.looking.update(&self.gpu, self.walk.as_ref())
     }
 
     /// Passes on what is wanted of the solution.
@@ -282,17 +321,29 @@ impl Live {
         }
     }
 
-    fn mouse_button(&mut self, state: ElementState, button: MouseButton, taken: bool) {
-        match (button, state) {
-            (MouseButton::Left, ElementState::Pressed) if !taken && self.mouse == Mouse::Free => {
-                self.mouse = Mouse::Dragging;
+    fn mouse_button(&mut self, state: ElementState, button: MouseButton, taken: bool) -> Result<(), WindowError> {
+        match (button, state, self.mouse) {
+            (MouseButton::Left, ElementState::Pressed, Mouse::Free) if !taken => {
+                self.mouse = Mouse::Pressed;
+                self.pressed = self.cursor;
             }
-            (MouseButton::Left, ElementState::Released) if self.mouse == Mouse::Dragging => {
+            (MouseButton::Left, ElementState::Released, Mouse::Pressed) => {
                 self.mouse = Mouse::Free;
+                self.pick()?;
             }
-            (MouseButton::Right, ElementState::Pressed) if !taken => self.toggle_capture(),
+            (MouseButton::Left, ElementState::Released, Mouse::Dragging) => self.mouse = Mouse::Free,
+            (MouseButton::Right, ElementState::Pressed, _) if !taken => self.toggle_capture(),
             _ => {}
         }
+        Ok(())
+    }
+
+    /// Looks inside the point under the cursor.
+    fn pick(&mut self) -> Result<(), WindowError> {
+        let Some(cursor) = self.cursor else { return Ok(()) };
+        let size = [self.config.width, self.config.height];
+        self.looking.pick(self.walker.view.eye, self.walker.view.direction([cursor.x, cursor.y], size));
+        self.look()
     }
 
     /// The mouse was moved by so many counts, wherever the cursor is.
@@ -305,6 +356,10 @@ impl Live {
     /// A drag across the whole picture turns by the whole field of view, like turning one's head that far.
     fn drag(&mut self, position: PhysicalPosition<f64>) {
         let last = self.cursor.replace(position);
+        let moved = |from: PhysicalPosition<f64>| (position.x - from.x).hypot(position.y - from.y);
+        if self.mouse == Mouse::Pressed && self.pressed.is_none_or(|from| moved(from) > STILL) {
+            self.mouse = Mouse::Dragging;
+        }
         if let (Mouse::Dragging, Some(last)) = (self.mouse, last) {
             let [width, height] = [self.config.width, self.config.height].map(|side| f64::from(side.max(1)));
             let turn = self.walker.view.breadth(width / height) / width;
@@ -346,6 +401,11 @@ impl Live {
         Tone { exposure: self.automatic.exposure * self.settings.stops.exp2(), ..self.automatic }
     }
 
+    /// The scale of false colours; what is brighter in the picture is higher on it.
+    fn gauge(&self) -> Gauge {
+        Gauge { high: self.gauge.high / self.settings.stops.exp2(), ..self.gauge }
+    }
+
     /// Applies the configuration, unless the window is minimised.
     fn configure(&self) {
         if self.config.width > 0 && self.config.height > 0 {
@@ -383,7 +443,7 @@ impl Live {
         let Some(output) = self.next_output()? else {
             return Ok(());
         };
-        let mesh = self.walk.mesh();
+        let (mesh, gauge) = (self.walk.mesh(), self.gauge());
         let facts = Facts {
             scene: self.walk.name(),
             camera: self.camera.and_then(|i| self.walk.cameras().get(i)).map(|(name, _)| name.as_str()),
@@ -395,13 +455,15 @@ impl Live {
             frame: self.frame_time,
             device: &self.device,
             status: &self.status,
+            inside: self.looking.text(),
+            gauge,
         };
         let before = self.settings;
         let layout = self.hud.layout(&self.window, &facts, &mut self.settings);
         self.again = layout.again;
         let target = output.texture.create_view(&wgpu::TextureViewDescriptor::default());
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let frame = Frame { view: &self.walker.view, tone: &self.tone(), mesh };
+        let frame = Frame { view: &self.walker.view, tone: &self.tone(), mesh, gauge, marks: self.looking.marks() };
         self.pass.draw(&self.gpu, &self.shown.buffers, &mut encoder, &target, size, &frame);
         self.hud.draw(&self.gpu, &mut encoder, &target, size, layout);
         self.gpu.queue.submit([encoder.finish()]);
@@ -464,7 +526,13 @@ impl Live {
             return Ok(());
         }
         self.follow(size);
-        let frame = Frame { view: &self.walker.view, tone: &self.tone(), mesh: self.walk.mesh() };
+        let frame = Frame {
+            view: &self.walker.view,
+            tone: &self.tone(),
+            mesh: self.walk.mesh(),
+            gauge: self.gauge(),
+            marks: self.looking.marks(),
+        };
         let picture = Snapshot::draw(&self.gpu, &self.layouts, &self.shown.buffers, size, &frame)?;
         let Some(path) = unused("hr-view", "png") else { return Ok(()) };
         match picture.save_png(&path) {

@@ -1,6 +1,7 @@
 //! How a scene is drawn: shader, layouts, pipelines, and intermediate targets.
 
 use super::gpu::{DEPTH, Gpu};
+use super::overlay::Overlay;
 use super::scene_buffers::{Frame, GLOSSY_ATTRIBUTES, SceneBuffers, VERTEX_ATTRIBUTES, Vertex};
 use glossy_ext::Rgb;
 
@@ -35,6 +36,7 @@ pub(super) struct Pass {
     samples: u32,
     diffuse: wgpu::RenderPipeline,
     glossy: wgpu::RenderPipeline,
+    overlay: Overlay,
     targets: Option<Targets>,
 }
 
@@ -95,11 +97,12 @@ impl Pass {
             samples,
             diffuse: pipeline("diffuse_vertex", std::slice::from_ref(&fixed)),
             glossy: pipeline("glossy_vertex", &[fixed.clone(), following]),
+            overlay: Overlay::new(gpu, layouts, format, samples),
             targets: None,
         }
     }
 
-    /// Draws the scene onto `output`, which has this pass's format and `size` ≥ 1 × 1.
+    /// Draws the scene and marks over it onto `output`, which has this pass's format and `size` ≥ 1 × 1.
     pub(super) fn draw(
         &mut self,
         gpu: &Gpu,
@@ -156,6 +159,7 @@ impl Pass {
                 pass.draw_indexed(batch.indices.clone(), 0, 0..1);
             }
         }
+        self.overlay.draw(&mut pass, frame.marks);
     }
 }
 

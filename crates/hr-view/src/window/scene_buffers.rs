@@ -1,8 +1,10 @@
 //! A mesh on the device.
 
 use super::WindowError;
+use super::gauge::{DECADES, Gauge, RAMP};
 use super::gpu::Gpu;
 use super::lists::VertexList;
+use super::overlay::Marks;
 use super::pipelines::Layouts;
 use super::textures::Uploader;
 use super::tone::{BRIGHTEST, Tone, finite};
@@ -11,6 +13,7 @@ use crate::display::{Batch, DisplayMesh};
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Vec3, Vec4};
 use glossy_ext::Rgb;
+use std::f32::consts::LOG2_10;
 use wgpu::util::DeviceExt;
 
 /// The near plane, as a share of the scene's diagonal: closer than anyone goes to a wall, and depth does not mind.
@@ -27,6 +30,9 @@ pub(super) struct FrameUniform {
     to_srgb: [[f32; 4]; 3],
     numerator: [f32; 4],
     denominator: [f32; 4],
+    luminance: [f32; 4],
+    scale: [f32; 4],
+    ramp: [[f32; 4]; RAMP.len()],
 }
 
 /// A vertex that never changes.
@@ -119,6 +125,9 @@ pub(super) struct Frame<'a> {
     pub(super) view: &'a View,
     pub(super) tone: &'a Tone,
     pub(super) mesh: &'a DisplayMesh,
+    pub(super) gauge: Gauge,
+    /// What is drawn over it.
+    pub(super) marks: &'a [Marks],
 }
 
 impl Frame<'_> {
@@ -135,6 +144,9 @@ impl Frame<'_> {
             to_srgb: [0, 1, 2].map(|i| column(tone.to_srgb.col(i), 0.0)),
             numerator: [n[0], n[1], tone.exposure, BRIGHTEST],
             denominator: [d[0], d[1], d[2], if format.is_srgb() { 0.0 } else { 1.0 }],
+            luminance: column(self.mesh.primaries.luminance_weights().as_vec3(), self.gauge.quantity.number()),
+            scale: [self.gauge.high.log2() - DECADES * LOG2_10, (DECADES * LOG2_10).recip(), 0.0, 0.0],
+            ramp: RAMP.map(|[r, g, b]| [r, g, b, 0.0]),
         }
     }
 }
@@ -192,6 +204,6 @@ fn list_buffers(
 }
 
 /// A buffer size, if the device can hold it.
-fn fitting(size: u64, limit: u64) -> Result<u64, WindowError> {
+pub(super) fn fitting(size: u64, limit: u64) -> Result<u64, WindowError> {
     if size <= limit { Ok(size) } else { Err(WindowError::TooLarge { size, limit }) }
 }

@@ -1,6 +1,7 @@
 //! Pictures without a screen: screenshots, and frames drawn by the device without a window.
 
 use super::WindowError;
+use super::gauge::Gauge;
 use super::gpu::{Gpu, one_line};
 use super::lists::split;
 use super::pipelines::{Layouts, Pass};
@@ -42,7 +43,7 @@ impl Snapshot {
         let mut shown = Shown::new(&gpu, &layouts, walk, split(mesh))?;
         shown.follow(&gpu, walk, &view, size, 0.0);
         let automatic = Tone::for_mesh(mesh);
-        let frame = Frame { view: &view, tone: tone.unwrap_or(&automatic), mesh };
+        let frame = Frame { view: &view, tone: tone.unwrap_or(&automatic), mesh, gauge: Gauge::OFF, marks: &[] };
         Self::draw(&gpu, &layouts, &shown.buffers, size, &frame)
     }
 

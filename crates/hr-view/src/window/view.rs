@@ -96,6 +96,13 @@ impl View {
         2.0 * self.scales(aspect)[0].recip().atan()
     }
 
+    /// Direction (any length) through a point in pixels from the upper left corner of a picture of a size.
+    pub(super) fn direction(&self, [x, y]: [f64; 2], size: [u32; 2]) -> DVec3 {
+        let [width, height] = size.map(|side| f64::from(side.max(1)));
+        let [sx, sy] = self.scales(width / height);
+        self.forward + self.right * ((2.0 * x / width - 1.0) / sx) + self.up * ((1.0 - 2.0 * y / height) / sy)
+    }
+
     /// The part of space that a picture of width / height `aspect` shows, relative to `origin`.
     pub(super) fn sight(&self, origin: DVec3, aspect: f64) -> Sight {
         let [x, y] = self.scales(aspect);
@@ -165,6 +172,9 @@ mod tests {
             assert!((again.forward - view.forward).length() < 1e-8, "{size:?}: {} {}", again.forward, view.forward);
             let off = (again.breadth(aspect) - view.breadth(aspect)).abs();
             assert!(off < 1e-9, "{size:?}: the breadth is off by {off}");
+            let at = [0.3, 0.8].map(|share| share * f64::from(size[0].min(size[1])));
+            let turn = view.direction(at, size).normalize() - camera.direction(at[0], at[1]);
+            assert!(turn.length() < 1e-8, "{size:?}: the same pixel looks the same way, not {turn} off");
         }
     }
 
