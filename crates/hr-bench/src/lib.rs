@@ -11,6 +11,7 @@
 //! | `threads` | what more threads bring, and that they change nothing |
 //! | `form-factors` | form factors against closed forms and brute force |
 //! | `visibility` | rays per second |
+//! | `view` | time of frames along a walk |
 
 pub mod accuracy;
 pub mod args;
@@ -19,6 +20,7 @@ pub mod curve;
 pub mod error;
 pub mod float_image;
 pub mod form_factors;
+pub mod frames;
 pub mod growth;
 pub mod irradiance;
 pub mod measure;

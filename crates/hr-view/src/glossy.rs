@@ -60,8 +60,18 @@ pub(crate) fn shares(solution: &Solution<GlossyField>, corners: &[(u32, f32)]) -
 /// 5.2), at a place with the unit normal given, in the unit direction `away`.
 #[must_use]
 pub fn interpolated(solution: &Solution<GlossyField>, corners: &[(u32, f32)], normal: Vec3, away: Vec3) -> Rgb {
+    blended(solution, shares(solution, corners), normal, away)
+}
+
+/// The same from leaves and their shares, as [`shares`] gives them.
+pub(crate) fn blended(
+    solution: &Solution<GlossyField>,
+    leaves: impl IntoIterator<Item = (u32, f32)>,
+    normal: Vec3,
+    away: Vec3,
+) -> Rgb {
     let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
-    for (leaf, share) in shares(solution, corners) {
+    for (leaf, share) in leaves {
         let (light, weight) = leaving(solution, NodeId(leaf), normal, away);
         sum += light * weight * share;
         weights += weight * share;

@@ -28,6 +28,9 @@ pub struct Walkthrough {
     mesh: DisplayMesh,
     /// Per entry of the mesh's `glossy`.
     sources: Vec<Source>,
+    /// The leaves around each of them with their shares, each leaf once: those of entry i are at `first[i]..first[i + 1]`.
+    leaves: Vec<(u32, f32)>,
+    first: Vec<u32>,
 }
 
 impl Walkthrough {
@@ -36,7 +39,22 @@ impl Walkthrough {
     #[must_use]
     pub fn new(solved: Arc<Solved>, mode: Mode) -> Self {
         let (mesh, sources) = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
-        Self { solved, mode, mesh, sources }
+        let (mut leaves, mut first) = (Vec::new(), vec![0]);
+        let mut around = Vec::new();
+        for source in &sources {
+            around.clear();
+            around.extend(glossy::shares(&solved.solution, &source.corners));
+            around.sort_unstable_by_key(|&(leaf, _)| leaf);
+            let start = leaves.len();
+            for &(leaf, share) in &around {
+                match leaves[start..].last_mut() {
+                    Some((last, sum)) if *last == leaf => *sum += share,
+                    _ => leaves.push((leaf, share)),
+                }
+            }
+            first.push(leaves.len() as u32);
+        }
+        Self { solved, mode, mesh, sources, leaves, first }
     }
 
     /// Glossy radiance of a vertex toward an eye in unit space.
@@ -59,7 +77,8 @@ impl Walkthrough {
                 return glossy::reflected(solution, reflector.as_ref(), leaf, &place, away, NARROWEST, scratch);
             }
         }
-        glossy::interpolated(solution, &source.corners, normal, away)
+        let leaves = &self.leaves[self.first[slot] as usize..self.first[slot + 1] as usize];
+        glossy::blended(solution, leaves.iter().copied(), normal, away)
     }
 }
 

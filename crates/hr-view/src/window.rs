@@ -4,6 +4,7 @@
 //! happen per pixel.
 
 mod app;
+mod chunks;
 mod gauge;
 mod gpu;
 mod hud;
@@ -11,6 +12,7 @@ mod input;
 pub(crate) mod lists;
 mod live;
 mod looking;
+mod offscreen;
 mod overlay;
 mod pipelines;
 mod refresh;
@@ -24,6 +26,7 @@ mod tour;
 mod view;
 mod walker;
 
+pub use offscreen::{FrameCost, Offscreen};
 pub use screen::{Screen, Status, Wish};
 pub use snapshot::Snapshot;
 pub use tone::{Curve, Tone};

@@ -34,6 +34,10 @@ const NOTCH: f64 = 40.0;
 /// A mouse that is moved by no more pixels between press and release clicks.
 const STILL: f64 = 3.0;
 
+/// While the eye moves, glossy vertices wait until its direction has changed by this (radians, 1°), which nobody sees
+/// then; when it comes to rest, all are made exact.
+const MOVING: f32 = 0.017_453_3;
+
 /// Whether to go on.
 pub(super) enum Next {
     Go,
@@ -485,7 +489,8 @@ impl Live {
 
     /// Brings glossy radiances up to date.
     fn follow(&mut self, size: [u32; 2]) {
-        let tolerance = self.settings.tolerance.to_radians();
+        let moves = self.walker.is_moving() || self.tour.is_playing();
+        let tolerance = self.settings.tolerance.to_radians().max(if moves { MOVING } else { 0.0 });
         let evaluated = self.shown.follow(&self.gpu, self.walk.as_ref(), &self.walker.view, size, tolerance);
         self.walked.evaluated += evaluated as u64;
     }

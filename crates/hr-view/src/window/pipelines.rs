@@ -9,7 +9,8 @@ use glossy_ext::Rgb;
 pub(super) struct Layouts {
     pub(super) frame: wgpu::BindGroupLayout,
     pub(super) material: wgpu::BindGroupLayout,
-    scene: wgpu::PipelineLayout,
+    /// Without and with a texture.
+    scene: [wgpu::PipelineLayout; 2],
     shader: wgpu::ShaderModule,
 }
 
@@ -21,11 +22,14 @@ impl Layouts {
             entries: &[uniform_entry(0, wgpu::ShaderStages::VERTEX_FRAGMENT)],
         });
         let material = material_layout(device);
-        let scene = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("scene"),
-            bind_group_layouts: &[Some(&frame), Some(&material)],
-            immediate_size: 0,
-        });
+        let layout = |groups: &[Option<&wgpu::BindGroupLayout>]| {
+            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("scene"),
+                bind_group_layouts: groups,
+                immediate_size: 0,
+            })
+        };
+        let scene = [layout(&[Some(&frame)]), layout(&[Some(&frame), Some(&material)])];
         Self { frame, material, scene, shader: device.create_shader_module(wgpu::include_wgsl!("scene.wgsl")) }
     }
 }
@@ -34,9 +38,12 @@ impl Layouts {
 pub(super) struct Pass {
     format: wgpu::TextureFormat,
     samples: u32,
-    diffuse: wgpu::RenderPipeline,
-    glossy: wgpu::RenderPipeline,
+    /// Without and with a texture.
+    diffuse: [wgpu::RenderPipeline; 2],
+    glossy: [wgpu::RenderPipeline; 2],
     overlay: Overlay,
+    /// Chunks to be drawn, by their distance; kept for its memory.
+    order: Vec<(f32, usize)>,
     targets: Option<Targets>,
 }
 
@@ -50,10 +57,13 @@ struct Targets {
 
 impl Pass {
     pub(super) fn new(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat, samples: u32) -> Self {
-        let pipeline = |entry: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
+        let pipeline = |entry: &str,
+                        fragment: &str,
+                        layout: &wgpu::PipelineLayout,
+                        buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
             gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(entry),
-                layout: Some(&layouts.scene),
+                layout: Some(layout),
                 vertex: wgpu::VertexState {
                     module: &layouts.shader,
                     entry_point: Some(entry),
@@ -74,7 +84,7 @@ impl Pass {
                 multisample: wgpu::MultisampleState { count: samples, ..wgpu::MultisampleState::default() },
                 fragment: Some(wgpu::FragmentState {
                     module: &layouts.shader,
-                    entry_point: Some("fragment"),
+                    entry_point: Some(fragment),
                     compilation_options: wgpu::PipelineCompilationOptions::default(),
                     targets: &[Some(format.into())],
                 }),
@@ -92,12 +102,17 @@ impl Pass {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &GLOSSY_ATTRIBUTES,
         });
+        let both = |list: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
+            [("plain", &layouts.scene[0]), ("textured", &layouts.scene[1])]
+                .map(|(kind, layout)| pipeline(&format!("{list}_{kind}"), &format!("{kind}_fragment"), layout, buffers))
+        };
         Self {
             format,
             samples,
-            diffuse: pipeline("diffuse_vertex", std::slice::from_ref(&fixed)),
-            glossy: pipeline("glossy_vertex", &[fixed.clone(), following]),
+            diffuse: both("diffuse", std::slice::from_ref(&fixed)),
+            glossy: both("glossy", &[fixed.clone(), following]),
             overlay: Overlay::new(gpu, layouts, format, samples),
+            order: Vec::new(),
             targets: None,
         }
     }
@@ -141,22 +156,34 @@ impl Pass {
             }),
             ..wgpu::RenderPassDescriptor::default()
         });
+        let sight = frame.view.sight(frame.mesh.origin, f64::from(size[0]) / f64::from(size[1]));
         pass.set_bind_group(0, &scene.frame_group, &[]);
-        for (list, pipeline, follows) in [(&scene.diffuse, &self.diffuse, false), (&scene.glossy, &self.glossy, true)] {
-            if list.batches.is_empty() {
+        for (list, pipelines, follows) in [(&scene.diffuse, &self.diffuse, false), (&scene.glossy, &self.glossy, true)]
+        {
+            if list.chunks.is_empty() {
                 continue;
             }
-            pass.set_pipeline(pipeline);
             pass.set_vertex_buffer(0, list.vertices.slice(..));
             if follows {
                 pass.set_vertex_buffer(1, scene.glossy_radiance.slice(..));
             }
             pass.set_index_buffer(list.indices.slice(..), wgpu::IndexFormat::Uint32);
-            let white = scene.materials.len() - 1;
-            for batch in &list.batches {
-                let material = batch.texture.map_or(white, |t| t as usize);
-                pass.set_bind_group(1, &scene.materials[material], &[]);
-                pass.draw_indexed(batch.indices.clone(), 0, 0..1);
+            // The nearest first, so that what is hidden is not shaded.
+            self.order.clear();
+            let seen = list.chunks.iter().enumerate().filter(|(_, chunk)| chunk.may_be_seen(&sight));
+            self.order.extend(seen.map(|(i, chunk)| (chunk.distance(&sight), i)));
+            self.order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            let mut last = None;
+            for &(_, i) in &self.order {
+                let chunk = &list.chunks[i];
+                if last != Some(chunk.texture) {
+                    last = Some(chunk.texture);
+                    pass.set_pipeline(&pipelines[usize::from(chunk.texture.is_some())]);
+                    if let Some(texture) = chunk.texture {
+                        pass.set_bind_group(1, &scene.materials[texture as usize], &[]);
+                    }
+                }
+                pass.draw_indexed(chunk.indices.clone(), 0, 0..1);
             }
         }
         self.overlay.draw(&mut pass, frame.marks);

@@ -1,15 +1,15 @@
 //! A mesh on the device.
 
 use super::WindowError;
+use super::chunks::{Chunk, Chunked};
 use super::gauge::{DECADES, Gauge, RAMP};
 use super::gpu::Gpu;
-use super::lists::VertexList;
 use super::overlay::Marks;
 use super::pipelines::Layouts;
 use super::textures::Uploader;
 use super::tone::{BRIGHTEST, Tone, finite};
 use super::view::View;
-use crate::display::{Batch, DisplayMesh};
+use crate::display::DisplayMesh;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Vec3, Vec4};
 use glossy_ext::Rgb;
@@ -54,7 +54,7 @@ pub(super) const GLOSSY_ATTRIBUTES: [wgpu::VertexAttribute; 1] = wgpu::vertex_at
 pub(super) struct ListBuffers {
     pub(super) vertices: wgpu::Buffer,
     pub(super) indices: wgpu::Buffer,
-    pub(super) batches: Vec<Batch>,
+    pub(super) chunks: Vec<Chunk>,
 }
 
 /// Everything of a mesh that lives on the device.
@@ -62,7 +62,7 @@ pub(super) struct SceneBuffers {
     pub(super) diffuse: ListBuffers,
     pub(super) glossy: ListBuffers,
     pub(super) glossy_radiance: wgpu::Buffer,
-    /// Per texture, and last a white one.
+    /// Per texture.
     pub(super) materials: Vec<wgpu::BindGroup>,
     pub(super) frame: wgpu::Buffer,
     pub(super) frame_group: wgpu::BindGroup,
@@ -75,7 +75,7 @@ impl SceneBuffers {
         gpu: &Gpu,
         layouts: &Layouts,
         mesh: &DisplayMesh,
-        lists: &[VertexList; 2],
+        lists: &[Chunked; 2],
     ) -> Result<Self, WindowError> {
         let device = &gpu.device;
         let [diffuse, glossy] = lists;
@@ -92,11 +92,9 @@ impl SceneBuffers {
         });
         let uploader = Uploader::new(gpu);
         let textures = mesh.textures.iter().map(|texture| (uploader.upload(texture), texture.transform));
-        let materials = textures.chain([(uploader.white(), Mat3::IDENTITY)]);
-        let materials =
-            materials.map(|(texture, place)| material(device, &layouts.material, &texture, place)).collect();
+        let materials = textures.map(|(texture, place)| material(device, &layouts.material, &texture, place)).collect();
         let limit = device.limits().max_buffer_size;
-        let glossy_bytes = (glossy.vertices.len() * size_of::<Rgb>()).max(size_of::<Rgb>()) as u64;
+        let glossy_bytes = (glossy.list.vertices.len() * size_of::<Rgb>()).max(size_of::<Rgb>()) as u64;
         let diagonal = mesh.diagonal();
         Ok(Self {
             diffuse: list_buffers(device, mesh, diffuse, limit)?,
@@ -177,11 +175,11 @@ fn material(
 fn list_buffers(
     device: &wgpu::Device,
     mesh: &DisplayMesh,
-    list: &VertexList,
+    list: &Chunked,
     limit: u64,
 ) -> Result<ListBuffers, WindowError> {
-    fitting((list.vertices.len() * size_of::<Vertex>()) as u64, limit)?;
-    fitting((list.indices.len() * size_of::<u32>()) as u64, limit)?;
+    fitting((list.list.vertices.len() * size_of::<Vertex>()) as u64, limit)?;
+    fitting((list.list.indices.len() * size_of::<u32>()) as u64, limit)?;
     let vertex = |&v: &u32| {
         let v = v as usize;
         Vertex {
@@ -192,14 +190,14 @@ fn list_buffers(
             uv: mesh.uv[v].to_array(),
         }
     };
-    let vertices: Vec<Vertex> = list.vertices.iter().map(vertex).collect();
+    let vertices: Vec<Vertex> = list.list.vertices.iter().map(vertex).collect();
     let buffer = |label, contents: &[u8], usage| {
         device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
     };
     Ok(ListBuffers {
         vertices: buffer("vertices", bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
-        indices: buffer("indices", bytemuck::cast_slice(&list.indices), wgpu::BufferUsages::INDEX),
-        batches: list.batches.clone(),
+        indices: buffer("indices", bytemuck::cast_slice(&list.list.indices), wgpu::BufferUsages::INDEX),
+        chunks: list.chunks.clone(),
     })
 }
 

@@ -1,6 +1,6 @@
 //! Between those who solve and the window: pictures and news come in, wishes go out.
 
-use super::lists::{VertexList, split};
+use super::chunks::{Chunked, chunked};
 use super::tone::Tone;
 use crate::camera_path::CameraPath;
 use crate::display::{MeshError, Walkable};
@@ -39,7 +39,7 @@ pub struct Status {
 /// A solution, ready for the device.
 pub(super) struct Prepared {
     pub(super) walk: Arc<dyn Walkable>,
-    pub(super) lists: [VertexList; 2],
+    pub(super) lists: [Chunked; 2],
     pub(super) tone: Tone,
     pub(super) tour: CameraPath,
 }
@@ -49,7 +49,7 @@ impl Prepared {
     pub(super) fn new(walk: Arc<dyn Walkable>) -> Result<Self, MeshError> {
         let mesh = walk.mesh();
         mesh.check()?;
-        Ok(Self { lists: split(mesh), tone: Tone::for_mesh(mesh), tour: walk.tour(), walk })
+        Ok(Self { lists: chunked(mesh), tone: Tone::for_mesh(mesh), tour: walk.tour(), walk })
     }
 }
 

@@ -1,8 +1,8 @@
 //! A solution on the device, with its glossy light as the eye sees it.
 
 use super::WindowError;
+use super::chunks::Chunked;
 use super::gpu::Gpu;
-use super::lists::VertexList;
 use super::pipelines::Layouts;
 use super::refresh::{Refresh, Refreshed};
 use super::scene_buffers::SceneBuffers;
@@ -17,7 +17,7 @@ type Circumstances = (View, [u32; 2], f32);
 pub(super) struct Shown {
     pub(super) buffers: SceneBuffers,
     /// Triangles with a vertex whose radiance follows the eye.
-    glossy: VertexList,
+    glossy: Chunked,
     refresh: Refresh,
     computed_for: Option<Circumstances>,
     /// What the last refresh did, and how long it took.
@@ -31,11 +31,11 @@ impl Shown {
         gpu: &Gpu,
         layouts: &Layouts,
         walk: &dyn Walkable,
-        lists: [VertexList; 2],
+        lists: [Chunked; 2],
     ) -> Result<Self, WindowError> {
         let buffers = SceneBuffers::new(gpu, layouts, walk.mesh(), &lists)?;
         let [_, glossy] = lists;
-        let refresh = Refresh::new(walk, &glossy);
+        let refresh = Refresh::new(walk, &glossy.list);
         let (refreshed, evaluation) = (Refreshed::default(), Duration::ZERO);
         Ok(Self { buffers, glossy, refresh, computed_for: None, refreshed, evaluation })
     }

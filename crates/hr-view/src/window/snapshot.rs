@@ -1,9 +1,9 @@
 //! Pictures without a screen: screenshots, and frames drawn by the device without a window.
 
 use super::WindowError;
+use super::chunks::chunked;
 use super::gauge::Gauge;
 use super::gpu::{Gpu, one_line};
-use super::lists::split;
 use super::pipelines::{Layouts, Pass};
 use super::scene_buffers::{Frame, SceneBuffers};
 use super::shown::Shown;
@@ -15,6 +15,27 @@ use hr_scene::{Camera, SceneError};
 use image::ImageEncoder;
 use std::io;
 use std::path::Path;
+
+/// Format of pictures in memory.
+pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// A texture to draw a picture on and to read it back from.
+pub(super) fn target(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<wgpu::Texture, WindowError> {
+    let limit = gpu.device.limits().max_texture_dimension_2d;
+    if width > limit || height > limit {
+        return Err(WindowError::TooLarge { size: width.max(height).into(), limit: limit.into() });
+    }
+    Ok(gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("snapshot"),
+        size: wgpu::Extent3d { width: width.max(1), height: height.max(1), depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: FORMAT,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    }))
+}
 
 /// An 8-bit sRGB picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,7 +61,7 @@ impl Snapshot {
         let layouts = Layouts::new(&gpu);
         let size = [camera.width.max(1), camera.height.max(1)];
         let view = View::of_camera(camera);
-        let mut shown = Shown::new(&gpu, &layouts, walk, split(mesh))?;
+        let mut shown = Shown::new(&gpu, &layouts, walk, chunked(mesh))?;
         shown.follow(&gpu, walk, &view, size, 0.0);
         let automatic = Tone::for_mesh(mesh);
         let frame = Frame { view: &view, tone: tone.unwrap_or(&automatic), mesh, gauge: Gauge::OFF, marks: &[] };
@@ -55,22 +76,8 @@ impl Snapshot {
         [width, height]: [u32; 2],
         frame: &Frame<'_>,
     ) -> Result<Self, WindowError> {
-        let limit = gpu.device.limits().max_texture_dimension_2d;
-        if width > limit || height > limit {
-            return Err(WindowError::TooLarge { size: width.max(height).into(), limit: limit.into() });
-        }
-        let format = wgpu::TextureFormat::Rgba8Unorm;
-        let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
-        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("snapshot"),
-            size,
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+        let texture = target(gpu, [width, height])?;
+        let size = texture.size();
         let row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("snapshot"),
@@ -80,7 +87,7 @@ impl Snapshot {
         });
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Pass::new(gpu, layouts, format, gpu.samples(format)).draw(
+        Pass::new(gpu, layouts, FORMAT, gpu.samples(FORMAT)).draw(
             gpu,
             scene,
             &mut encoder,

@@ -106,7 +106,7 @@ impl View {
     /// The part of space that a picture of width / height `aspect` shows, relative to `origin`.
     pub(super) fn sight(&self, origin: DVec3, aspect: f64) -> Sight {
         let [x, y] = self.scales(aspect);
-        let side = |across: DVec3, scale: f64| (self.forward + across * scale).as_vec3();
+        let side = |across: DVec3, scale: f64| (self.forward + across * scale).normalize().as_vec3();
         Sight {
             eye: (self.eye - origin).as_vec3(),
             sides: [side(self.right, x), side(-self.right, x), side(self.up, y), side(-self.up, y)],
