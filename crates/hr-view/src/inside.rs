@@ -32,6 +32,8 @@ pub struct Mark {
 /// What is known about a point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Finding {
+    /// Index of the material.
+    pub material: u32,
     /// Its figures, in lines.
     pub text: Vec<String>,
     /// Two ends of each arrow and outline: seen through everything.
@@ -82,8 +84,8 @@ impl Anatomy<'_> {
     fn look(&self, hit: &Hit, eye: Vec3) -> Finding {
         let solution = &self.solved.solution;
         let scene = &self.solved.scene;
-        let mut finding = Finding::default();
-        let material = &scene.materials[scene.surfaces[hit.surface as usize].material as usize];
+        let mut finding = Finding { material: scene.surfaces[hit.surface as usize].material, ..Finding::default() };
+        let material = &scene.materials[finding.material as usize];
         let side = if hit.front { "front" } else { "back" };
         let say = &mut finding.text;
         say.push(format!("surface {} ({side}), material '{}'", hit.surface, material.name));

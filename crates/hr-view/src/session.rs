@@ -17,9 +17,12 @@ use crate::stats::Times;
 use crate::walkthrough::Walkthrough;
 use crate::watched::Watched;
 use crate::window::{self, Screen, Status, WindowOptions, Wish};
+use glam::Vec3;
+use glossy_ext::Ward;
 use hr_diffuse::{Budget, Settings};
-use hr_scene::Scene;
+use hr_scene::{Material, Rgb, Scene};
 use std::collections::VecDeque;
+use std::f32::consts::SQRT_2;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -29,6 +32,13 @@ const COARSER: f32 = 4.0;
 /// The errors that can be asked for.
 const FINEST: f32 = 0.001;
 const COARSEST: f32 = 1.0;
+/// Exitance (W/m²) of lamps that are brightened; dimmed, they do not fall below its inverse.
+const BRIGHTEST: f32 = 1e20;
+/// Roughness that can be set.
+const LEAST_ALPHA: f32 = 0.02;
+const MOST_ALPHA: f32 = 0.8;
+/// The direction that a lobe's width is taken for.
+const ASLANT: Vec3 = Vec3::new(0.6, 0.0, 0.8);
 /// How often the scene's file is looked at.
 const LOOK: Duration = Duration::from_millis(700);
 /// The window is told of progress no more often than this.
@@ -105,6 +115,10 @@ struct Session {
     watched: Watched,
     looked: Instant,
     scene: Option<Arc<Scene>>,
+    /// Whether it is no longer what the file says; then it is not kept.
+    is_edited: bool,
+    /// Whether there is something in the window.
+    has_shown: bool,
     /// Seconds that loading took.
     loaded: f64,
     tasks: VecDeque<Task>,
@@ -130,6 +144,8 @@ impl Session {
             looked: now,
             told: now,
             scene: None,
+            is_edited: false,
+            has_shown: false,
             loaded: 0.0,
             tasks: VecDeque::from([Task::Load]),
             wanted: Wanted::Whole,
@@ -150,7 +166,7 @@ impl Session {
         loop {
             while let Some(task) = self.tasks.pop_front() {
                 if let Err(error) = pool.install(|| self.perform(task)) {
-                    if self.status.shown.is_none() {
+                    if !self.has_shown {
                         return self.fail(error);
                     }
                     self.tasks.clear();
@@ -214,6 +230,7 @@ impl Session {
         let scene = load(&self.args, &self.progress)?;
         self.loaded = begin.elapsed().as_secs_f64();
         self.scene = Some(Arc::clone(&scene));
+        self.is_edited = false;
         if let Some(path) = &self.args.load {
             let (solved, accuracy) = solution_file::load(path, scene)?;
             self.status.asked = accuracy.asked;
@@ -255,6 +272,10 @@ impl Session {
         let walkthrough = Walkthrough::new(Arc::clone(&solved), self.args.mode);
         self.screen.show(Arc::new(walkthrough)).map_err(window::WindowError::from)?;
         self.status.shown = Some(accuracy.believed);
+        self.has_shown = true;
+        if self.is_edited {
+            return Ok(());
+        }
         let times = Times {
             load: self.loaded,
             show: begin.elapsed().as_secs_f64(),
@@ -315,6 +336,8 @@ impl Session {
 
     fn hear(&mut self, wish: Wish) {
         match wish {
+            Wish::Emission { material, factor } => self.edit(material, |material| brightened(material, factor)),
+            Wish::Roughness { material, factor } => self.edit(material, |material| roughened(material, factor)),
             Wish::Finer => self.ask_for(0.5 * self.status.asked),
             Wish::Coarser => self.ask_for(2.0 * self.status.asked),
             Wish::Pause if self.status.activity.is_none() => self.screen.say("nothing is being solved"),
@@ -338,11 +361,31 @@ impl Session {
             return self.screen.say("still loading");
         }
         self.status.asked = error.clamp(FINEST, COARSEST);
-        self.status.paused = false;
-        self.tasks.clear();
-        self.tasks.push_back(Task::Solve { error: self.status.asked, in_any_case: true });
-        self.wanted = Wanted::Nothing;
+        self.again([self.status.asked]);
         self.screen.say(format!("solving to an error of {:.1} %", 100.0 * self.status.asked));
+    }
+
+    /// Solves to some errors, one after the other, instead of what is being done.
+    fn again(&mut self, errors: impl IntoIterator<Item = f32>) {
+        self.status.paused = false;
+        self.tasks = errors.into_iter().map(|error| Task::Solve { error, in_any_case: true }).collect();
+        self.wanted = Wanted::Nothing;
+    }
+
+    /// Changes a material and solves again, coarsely first; what is shown stays until then.
+    fn edit(&mut self, material: u32, change: impl FnOnce(&mut Material) -> Result<String, String>) {
+        let Some(scene) = &self.scene else { return self.screen.say("still loading") };
+        let mut scene = Scene::clone(scene);
+        let Some(changed) = scene.materials.get_mut(material as usize) else { return };
+        match change(changed) {
+            Ok(said) => self.screen.say(said),
+            Err(why) => return self.screen.say(why),
+        }
+        self.scene = Some(Arc::new(scene));
+        self.is_edited = true;
+        // Any solution of the new scene is better than one of the old.
+        self.status.shown = None;
+        self.again([(COARSER * self.status.asked).min(COARSEST), self.status.asked]);
     }
 
     /// Looks at the scene's file now and then; reads it again where it has changed.
@@ -358,5 +401,71 @@ impl Session {
             self.wanted = Wanted::Nothing;
             self.status.paused = false;
         }
+    }
+}
+
+/// A material that shines so many times as much; what is said about it.
+fn brightened(material: &mut Material, factor: f32) -> Result<String, String> {
+    if material.exitance == Rgb::ZERO {
+        return Err(format!("'{}' does not shine", material.name));
+    }
+    let exitance = material.exitance * factor;
+    if exitance.max_element() > BRIGHTEST || exitance.max_element() < BRIGHTEST.recip() {
+        return Err(format!("'{}' stays as it is", material.name));
+    }
+    material.exitance = exitance;
+    Ok(format!("'{}' emits {:.3} {:.3} {:.3} W/m² now", material.name, exitance.x, exitance.y, exitance.z))
+}
+
+/// A material whose gloss is so many times as wide, as Ward's reflector: it takes the place of any other; what is said
+/// about it.
+fn roughened(material: &mut Material, factor: f32) -> Result<String, String> {
+    let reflector = &material.reflector;
+    let (diffuse, glossy) = (reflector.diffuse(), reflector.glossy_albedo().max(Rgb::ZERO));
+    if reflector.is_diffuse() || reflector.mirror() != Rgb::ZERO || material.texture.is_some() {
+        return Err(format!("'{}' has no roughness that could be changed", material.name));
+    }
+    // Half-vector slopes of standard deviation α/√2 turn what is reflected by twice as much.
+    let alpha = reflector.lobe(ASLANT).width / SQRT_2;
+    let wanted = (alpha * factor).clamp(LEAST_ALPHA, MOST_ALPHA);
+    let ward = Ward::new(diffuse, glossy, wanted).map_err(|error| error.to_string())?;
+    material.reflector = Arc::new(ward);
+    Ok(format!("'{}' has a roughness α of {wanted:.3} now", material.name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glossy_ext::Reflector;
+
+    fn material(reflector: Arc<dyn Reflector>, exitance: Rgb) -> Material {
+        Material { name: "it".into(), reflector, exitance, two_sided: false, texture: None, base_color: Rgb::ONE }
+    }
+
+    #[test]
+    fn lamps_are_dimmed_within_reason() {
+        let black = || Arc::new(glossy_ext::Lambert::new(Rgb::ZERO).expect("black"));
+        let mut lamp = material(black(), Rgb::new(4.0, 2.0, 0.0));
+        assert!(brightened(&mut lamp, 0.5).is_ok_and(|said| said.contains("2.000 1.000 0.000")), "half the light");
+        assert_eq!(lamp.exitance, Rgb::new(2.0, 1.0, 0.0), "half the light");
+        assert!(brightened(&mut lamp, 1e30).is_err(), "there is an end to it");
+        assert!(brightened(&mut material(black(), Rgb::ZERO), 2.0).is_err(), "what does not shine stays dark");
+    }
+
+    #[test]
+    fn roughness_follows_and_energy_stays() {
+        let ward = Ward::new(Rgb::splat(0.3), Rgb::splat(0.4), 0.2).expect("sound");
+        let before = ward.glossy_albedo();
+        let mut metal = material(Arc::new(ward), Rgb::ZERO);
+        for factor in [SQRT_2, SQRT_2, 0.25] {
+            let width = metal.reflector.lobe(ASLANT).width;
+            roughened(&mut metal, factor).expect("it is glossy");
+            let change = metal.reflector.lobe(ASLANT).width / width;
+            assert!((change / factor - 1.0).abs() < 0.25, "{factor} times as rough is {change} times as wide");
+        }
+        let off = (metal.reflector.glossy_albedo() - before).abs().max_element();
+        assert!(off < 0.1, "it reflects {} after {before}", metal.reflector.glossy_albedo());
+        let lambert = Arc::new(glossy_ext::Lambert::new(Rgb::splat(0.5)).expect("grey"));
+        assert!(roughened(&mut material(lambert, Rgb::ZERO), 2.0).is_err(), "chalk has no gloss");
     }
 }

@@ -39,10 +39,11 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let mut failed = report("no_screen_is_an_error_at_once", &no_screen_is_an_error_at_once());
-    let on_a_screen: [(&str, Test); 4] = [
+    let on_a_screen: [(&str, Test); 5] = [
         ("a_walk_on_a_virtual_screen", a_walk_on_a_virtual_screen),
         ("nothing_is_drawn_while_nothing_changes", nothing_is_drawn_while_nothing_changes),
         ("walks_are_recorded_and_played", walks_are_recorded_and_played),
+        ("what_cannot_be_shown_is_one_line", what_cannot_be_shown_is_one_line),
         ("the_solution_follows_what_is_wanted", the_solution_follows_what_is_wanted),
     ];
     for (name, test) in on_a_screen {
@@ -130,6 +131,20 @@ fn folder() -> std::io::Result<PathBuf> {
     Ok(folder)
 }
 
+/// A virtual screen: its name, and what serves it.
+fn screen() -> Result<(String, Running), Box<dyn Error>> {
+    let mut server = Command::new("Xvfb")
+        .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()?;
+    let output = server.stdout.take().ok_or("Xvfb has no output")?;
+    let server = Running(server);
+    let mut number = String::new();
+    BufReader::new(output).read_line(&mut number)?;
+    Ok((format!(":{}", number.trim()), server))
+}
+
 /// A virtual screen with a window on it.
 struct Stage {
     display: String,
@@ -149,16 +164,7 @@ impl Stage {
 
     /// A program whose window has `name` in its title; it runs in a folder of its own.
     fn new(mut command: Command, name: &str) -> Result<Self, Box<dyn Error>> {
-        let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()?;
-        let output = server.stdout.take().ok_or("Xvfb has no output")?;
-        let server = Running(server);
-        let mut number = String::new();
-        BufReader::new(output).read_line(&mut number)?;
-        let display = format!(":{}", number.trim());
+        let (display, server) = screen()?;
         let folder = folder()?;
         command.current_dir(&folder).env("DISPLAY", &display).stderr(Stdio::piped());
         command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
@@ -413,4 +419,53 @@ fn the_solution_follows_what_is_wanted() -> Outcome {
     drop(std::fs::remove_dir_all(&home));
     // A file that cannot be read is no reason to close the window.
     said.map(drop)
+}
+
+fn what_cannot_be_shown_is_one_line() -> Outcome {
+    let (display, _server) = screen()?;
+    let home = folder()?;
+    std::fs::write(home.join("empty.mgf"), "# nothing\n")?;
+    std::fs::write(home.join("broken.mgf"), "f a b c\n")?;
+    std::fs::write(home.join("path.json"), "[]")?;
+    let outcome = [
+        (&["missing.mgf"][..], "missing.mgf"),
+        (&["empty.mgf"], "empty.mgf"),
+        (&["broken.mgf"], "broken.mgf:1"),
+        (&["cornell", "--camera", "missing.json"], "missing.json"),
+        (&["cornell", "--path", "path.json"], "path.json"),
+        (&["cornell", "--load", "broken.mgf"], "broken.mgf"),
+    ]
+    .into_iter()
+    .try_for_each(|(arguments, hint)| -> Outcome {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_hr-view"));
+        command.args(arguments).current_dir(&home).env("DISPLAY", &display).stderr(Stdio::piped());
+        command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+        let mut child = Running(command.spawn()?);
+        if child.exit_within(Duration::from_secs(30))? {
+            return Err(format!("{arguments:?} succeeds").into());
+        }
+        let mut text = String::new();
+        std::io::Read::read_to_string(&mut child.0.stderr.take().ok_or("no stderr")?, &mut text)?;
+        let lines: Vec<&str> = text.lines().filter(|line| line.starts_with("hr-view: ")).collect();
+        if lines.len() != 1 || !lines[0].contains(hint) || text.contains("panicked") || text.contains("internal") {
+            return Err(format!("{arguments:?}: not one line about {hint}: {text}").into());
+        }
+        Ok(())
+    });
+    drop(std::fs::remove_dir_all(&home));
+    outcome?;
+    // Without a driver there is a screen, but nothing to draw with.
+    let mut command = Command::new(std::env::current_exe()?);
+    command.arg("--open").env("DISPLAY", &display).env("WGPU_BACKEND", "vulkan").stderr(Stdio::piped());
+    command.env("VK_DRIVER_FILES", "/nonexistent.json").env("VK_ICD_FILENAMES", "/nonexistent.json");
+    let mut child = Running(command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET").spawn()?);
+    if child.exit_within(Duration::from_secs(30))? {
+        return Err("it draws without a driver".into());
+    }
+    let mut text = String::new();
+    std::io::Read::read_to_string(&mut child.0.stderr.take().ok_or("no stderr")?, &mut text)?;
+    if !text.contains("no graphics device") || !text.contains("--frames") || text.contains("panicked") {
+        return Err(format!("not a line that says what to do without a driver: {text}").into());
+    }
+    Ok(())
 }

@@ -6,6 +6,9 @@ use winit::keyboard::{Key, KeyCode, NamedKey};
 /// Stops per press of + or −.
 const STOPS: f32 = 1.0 / 3.0;
 
+/// What a press makes of emission or roughness.
+const EDIT_STEP: f32 = std::f32::consts::SQRT_2;
+
 /// The keys of the cameras in order.
 const CAMERA_KEYS: [KeyCode; 10] = [
     KeyCode::Digit1,
@@ -21,7 +24,7 @@ const CAMERA_KEYS: [KeyCode; 10] = [
 ];
 
 /// Keys and what they do, as the help shows them.
-pub(super) const HELP: [(&str, &str); 22] = [
+pub(super) const HELP: [(&str, &str); 24] = [
     ("W A S D, arrows up, down", "walk"),
     ("E Q, space shift", "up, down"),
     ("drag, arrows left, right", "look around"),
@@ -35,6 +38,8 @@ pub(super) const HELP: [(&str, &str); 22] = [
     ("V", "play the walk, or the scene's own"),
     ("click", "look inside a point: figures, samples, links, radiance"),
     ("L", "show or hide the links of the point"),
+    ("[ ]", "dim, brighten the lamp that was clicked"),
+    ("; '", "polish, roughen the surface that was clicked"),
     ("M", "outlines of elements"),
     ("B", "boxes of clusters, level by level"),
     ("G", "false colours: radiance, radiosity, irradiance"),
@@ -63,6 +68,10 @@ pub(super) enum Command {
     Record,
     Play,
     Links,
+    /// The picked material shines so many times as much.
+    Emission(f32),
+    /// The picked material's gloss is so many times as wide.
+    Roughness(f32),
     Elements,
     Clusters,
     Gauge,
@@ -87,6 +96,10 @@ pub(super) fn command(code: KeyCode, key: &Key, repeat: bool) -> Option<Command>
         (KeyCode::KeyX, _) => Command::Solve(Wish::Stop),
         (KeyCode::KeyR, _) => Command::Record,
         (KeyCode::KeyV, _) => Command::Play,
+        (KeyCode::BracketLeft, _) => Command::Emission(EDIT_STEP.recip()),
+        (KeyCode::BracketRight, _) => Command::Emission(EDIT_STEP),
+        (KeyCode::Semicolon, _) => Command::Roughness(EDIT_STEP.recip()),
+        (KeyCode::Quote, _) => Command::Roughness(EDIT_STEP),
         (KeyCode::KeyL, _) => Command::Links,
         (KeyCode::KeyM, _) => Command::Elements,
         (KeyCode::KeyB, _) => Command::Clusters,

@@ -269,6 +269,8 @@ impl Live {
                 let said = self.tour.record(Instant::now(), camera);
                 self.hud.say(said);
             }
+            Command::Emission(factor) => self.edit(|material| Wish::Emission { material, factor }),
+            Command::Roughness(factor) => self.edit(|material| Wish::Roughness { material, factor }),
             Command::Links => {
                 self.looking.toggle_links();
                 self.look()?;
@@ -306,6 +308,14 @@ impl Live {
         let heard = self.wishes.as_ref().is_some_and(|wishes| wishes.send(wish).is_ok());
         if !heard {
             self.hud.say("nobody solves here".to_owned());
+        }
+    }
+
+    /// Wants another material where a point was picked.
+    fn edit(&mut self, wish: impl FnOnce(u32) -> Wish) {
+        match self.looking.material() {
+            Some(material) => self.wish(wish(material)),
+            None => self.hud.say("click what is to be changed first".to_owned()),
         }
     }
 

@@ -31,6 +31,11 @@ impl Looking {
         self.finding.as_ref().map_or(&[], |finding| &finding.text)
     }
 
+    /// The material of the point that was picked.
+    pub(super) fn material(&self) -> Option<u32> {
+        self.finding.as_ref().map(|finding| finding.material)
+    }
+
     /// Picks the point that is seen from an eye in a direction.
     pub(super) fn pick(&mut self, eye: DVec3, direction: DVec3) {
         self.ray = Some([eye, direction]);

@@ -19,6 +19,20 @@ pub enum Wish {
     Pause,
     /// No more of it: show what there is.
     Stop,
+    /// A material that shines so many times as much.
+    Emission {
+        /// Index of the material.
+        material: u32,
+        /// Times what it is now, > 0.
+        factor: f32,
+    },
+    /// A material whose gloss is so many times as wide.
+    Roughness {
+        /// Index of the material.
+        material: u32,
+        /// Times what it is now, > 0.
+        factor: f32,
+    },
 }
 
 /// How far the solution is.

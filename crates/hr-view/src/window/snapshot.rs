@@ -140,3 +140,46 @@ impl Snapshot {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::window::Blank;
+
+    fn drawn(prepare: impl Fn(&Gpu), size: [u32; 2]) -> Option<Result<Snapshot, WindowError>> {
+        let gpu = match Gpu::new() {
+            Ok(gpu) => gpu,
+            Err(error) => {
+                eprintln!("skipped, no graphics device: {error}");
+                return None;
+            }
+        };
+        let (layouts, nothing) = (Layouts::new(&gpu), Blank::new("nothing"));
+        let mut shown = Shown::new(&gpu, &layouts, &nothing, chunked(nothing.mesh())).expect("nothing is not too much");
+        let view = View::looking(glam::DVec3::ZERO, glam::DVec3::X, glam::DVec3::Z, 60.0, 1.0);
+        prepare(&gpu);
+        shown.follow(&gpu, &nothing, &view, size, 0.0);
+        let tone = Tone::for_mesh(nothing.mesh());
+        let frame = Frame { view: &view, tone: &tone, mesh: nothing.mesh(), gauge: Gauge::OFF, marks: &[] };
+        Some(Snapshot::draw(&gpu, &layouts, &shown.buffers, size, &frame))
+    }
+
+    #[test]
+    fn nothing_is_black() {
+        let Some(picture) = drawn(|_| (), [3, 2]) else { return };
+        let picture = picture.expect("a picture of nothing");
+        assert!(picture.rgba.chunks(4).all(|p| p == [0, 0, 0, 255]), "black: {:?}", picture.rgba);
+    }
+
+    #[test]
+    fn a_device_that_is_lost_is_an_error() {
+        let Some(picture) = drawn(|gpu| gpu.device.destroy(), [3, 2]) else { return };
+        assert!(matches!(picture, Err(WindowError::Device(_))), "{picture:?}");
+    }
+
+    #[test]
+    fn pictures_beyond_the_device_are_refused() {
+        let Some(picture) = drawn(|_| (), [1 << 30, 1]) else { return };
+        assert!(matches!(picture, Err(WindowError::TooLarge { .. })), "{picture:?}");
+    }
+}
