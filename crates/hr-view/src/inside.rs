@@ -241,9 +241,12 @@ impl Anatomy<'_> {
             [low.min(mean), high.max(mean)]
         });
         finding.text.push(format!("leaves with radiance {low:.3} to {high:.3} W/(m² sr), mean of R, G, B"));
-        let corner = |(away, light): &(Vec3, Rgb)| Mark {
-            at: self.place(at + *away * (REACH * light.element_sum() / most)),
-            color: shade(*light, 1.0),
+        let corner = |(away, light): &(Vec3, Rgb)| {
+            // Darker toward the surface, so that its shape is seen.
+            let depth = 0.25 + 0.75 * element.normals.axis.dot(*away).max(0.0);
+            let [r, g, b, opacity] = shade(*light, 1.0);
+            let at = self.place(at + *away * (REACH * light.element_sum() / most));
+            Mark { at, color: [depth * r, depth * g, depth * b, opacity] }
         };
         for (inner, outer) in grid.iter().zip(&grid[1..]) {
             for m in 0..MERIDIANS as usize {

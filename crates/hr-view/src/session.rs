@@ -9,6 +9,7 @@ use crate::app::{STOPPING, load, write_stats};
 use crate::args::Args;
 use crate::camera_path::CameraPath;
 use crate::error::ViewError;
+use crate::glossy::Mode;
 use crate::interrupt::Interrupt;
 use crate::progress::{Progress, activity};
 use crate::solution_file::{self, Accuracy};
@@ -111,7 +112,8 @@ struct Session {
     screen: Screen,
     wishes: Receiver<Wish>,
     results: Arc<Mutex<Results>>,
-    interrupt: Interrupt,
+    /// While it solves; else Ctrl-C ends the program.
+    interrupt: Option<Interrupt>,
     watched: Watched,
     looked: Instant,
     scene: Option<Arc<Scene>>,
@@ -140,7 +142,7 @@ impl Session {
         Self {
             watched: Watched::new(args.scene.clone().into()),
             status: Status { asked: args.error, ..Status::default() },
-            interrupt: Interrupt::listen(),
+            interrupt: None,
             looked: now,
             told: now,
             scene: None,
@@ -160,7 +162,7 @@ impl Session {
     /// Does what there is to do until the window is closed.
     fn run(mut self) {
         let threads = self.args.threads.unwrap_or(0);
-        let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(threads).build() else {
+        let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(threads).start_handler(step_back).build() else {
             return self.fail(ViewError::Arguments("no threads can be started; ask for fewer with --threads".into()));
         };
         loop {
@@ -251,7 +253,15 @@ impl Session {
         self.begin("building the hierarchy");
         let is_glance = time == Some(Duration::ZERO);
         let settings = Settings { error, budget: Budget { time, ..Budget::default() } };
-        let (solved, mut accuracy) = Solved::awaited(scene, settings, !is_glance, &mut |state| self.attend(state))?;
+        // Mirrors are shown by their distributions in any mode; what is kept is for every mode.
+        let mirrors = || scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
+        let wants_distributions = self.args.mode == Mode::Distributions || self.args.save.is_some() || mirrors();
+        self.interrupt = Some(Interrupt::listen());
+        let found = Solved::awaited(Arc::clone(&scene), settings, wants_distributions && !is_glance, &mut |state| {
+            self.attend(state)
+        });
+        self.interrupt = None;
+        let (solved, mut accuracy) = found?;
         accuracy.asked = self.status.asked;
         if is_glance {
             // It is believed to be anything.
@@ -316,7 +326,7 @@ impl Session {
                 Err(TryRecvError::Empty) => break,
             }
         }
-        if self.interrupt.is_raised() && self.wanted == Wanted::Whole {
+        if self.interrupt.as_ref().is_some_and(Interrupt::is_raised) && self.wanted == Wanted::Whole {
             self.progress.say(STOPPING);
             self.hear(Wish::Stop);
         }
@@ -402,6 +412,13 @@ impl Session {
             self.status.paused = false;
         }
     }
+}
+
+/// Lets the window's threads go first: walking stays smooth while the solver takes what is left.
+fn step_back(_: usize) {
+    // On Linux it is the thread's own, elsewhere the process's.
+    #[cfg(target_os = "linux")]
+    let _niceness = rustix::process::nice(10);
 }
 
 /// A material that shines so many times as much; what is said about it.
