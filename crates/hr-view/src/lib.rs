@@ -4,6 +4,7 @@ pub mod app;
 pub mod args;
 pub mod camera_path;
 pub mod display;
+mod edits;
 pub mod error;
 pub mod facets;
 pub mod glossy;

@@ -4,6 +4,7 @@
 //! happen per pixel.
 
 mod app;
+mod canvas;
 mod chunks;
 mod gauge;
 mod gpu;

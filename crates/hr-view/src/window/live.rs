@@ -1,5 +1,6 @@
 //! The open window: events in, frames out.
 
+use super::canvas::{Canvas, Output};
 use super::gauge::Gauge;
 use super::gpu::Gpu;
 use super::hud::{Facts, Hud, Settings};
@@ -58,9 +59,8 @@ enum Mouse {
 /// The open window with everything that it shows.
 pub(super) struct Live {
     window: Arc<Window>,
-    surface: wgpu::Surface<'static>,
     gpu: Gpu,
-    config: wgpu::SurfaceConfiguration,
+    canvas: Canvas,
     layouts: Layouts,
     pass: Pass,
     walk: Arc<dyn Walkable>,
@@ -101,11 +101,11 @@ impl Live {
         let window = event_loop.create_window(attributes).map_err(|e| WindowError::NoDisplay(reason(&e)))?;
         let window = Arc::new(window);
         let (gpu, surface) = Gpu::with_surface(&window, &event_loop.owned_display_handle())?;
-        let config = configuration(&gpu, &surface, &window)?;
+        let canvas = Canvas::new(&gpu, surface, &window)?;
         let layouts = Layouts::new(&gpu);
         // Walking smoothly comes before smooth edges.
-        let samples = if gpu.is_slow() { 1 } else { gpu.samples(config.format) };
-        let pass = Pass::new(&gpu, &layouts, config.format, samples);
+        let samples = if gpu.is_slow() { 1 } else { gpu.samples(canvas.format()) };
+        let pass = Pass::new(&gpu, &layouts, canvas.format(), samples);
         let Prepared { lists, tone, .. } = Prepared::new(Arc::clone(&walk))?;
         let shown = Shown::new(&gpu, &layouts, walk.as_ref(), lists)?;
         gpu.fault()?;
@@ -113,7 +113,7 @@ impl Live {
         let walker = Walker::new(walk.as_ref());
         let tolerance = if options.tolerance.is_finite() { options.tolerance.to_degrees().max(0.0) } else { 0.0 };
         let live = Self {
-            hud: Hud::new(&gpu, &window, config.format),
+            hud: Hud::new(&gpu, &window, canvas.format()),
             settings: Settings { stops: 0.0, tolerance, fov_x: walker.view.fov_x },
             status: Status::default(),
             wishes: options.wishes.clone(),
@@ -134,13 +134,11 @@ impl Live {
             walk,
             shown,
             window,
-            surface,
             gpu,
-            config,
+            canvas,
             layouts,
             pass,
         };
-        live.configure();
         live.window.set_visible(true);
         live.window.request_redraw();
         Ok(live)
@@ -211,9 +209,7 @@ impl Live {
             WindowEvent::CloseRequested => return Ok(Next::Quit),
             WindowEvent::RedrawRequested => self.redraw()?,
             WindowEvent::Resized(size) => {
-                let limit = self.gpu.device.limits().max_texture_dimension_2d;
-                (self.config.width, self.config.height) = (size.width.min(limit), size.height.min(limit));
-                self.configure();
+                self.canvas.resize(&self.gpu, [size.width, size.height]);
                 self.window.request_redraw();
             }
             WindowEvent::ScaleFactorChanged { .. } | WindowEvent::Occluded(false) => self.window.request_redraw(),
@@ -265,7 +261,7 @@ impl Live {
             Command::Camera(index) => self.go_to(index),
             Command::Solve(wish) => self.wish(wish),
             Command::Record => {
-                let camera = self.walker.view.camera([self.config.width, self.config.height]);
+                let camera = self.walker.view.camera(self.canvas.size());
                 let said = self.tour.record(Instant::now(), camera);
                 self.hud.say(said);
             }
@@ -355,7 +351,7 @@ impl Live {
     /// Looks inside the point under the cursor.
     fn pick(&mut self) -> Result<(), WindowError> {
         let Some(cursor) = self.cursor else { return Ok(()) };
-        let size = [self.config.width, self.config.height];
+        let size = self.canvas.size();
         self.looking.pick(self.walker.view.eye, self.walker.view.direction([cursor.x, cursor.y], size));
         self.look()
     }
@@ -375,7 +371,7 @@ impl Live {
             self.mouse = Mouse::Dragging;
         }
         if let (Mouse::Dragging, Some(last)) = (self.mouse, last) {
-            let [width, height] = [self.config.width, self.config.height].map(|side| f64::from(side.max(1)));
+            let [width, height] = self.canvas.size().map(|side| f64::from(side.max(1)));
             let turn = self.walker.view.breadth(width / height) / width;
             self.turn((position.x - last.x) * turn, (last.y - position.y) * turn);
         }
@@ -420,13 +416,6 @@ impl Live {
         Gauge { high: self.gauge.high / self.settings.stops.exp2(), ..self.gauge }
     }
 
-    /// Applies the configuration, unless the window is minimised.
-    fn configure(&self) {
-        if self.config.width > 0 && self.config.height > 0 {
-            self.surface.configure(&self.gpu.device, &self.config);
-        }
-    }
-
     /// Moves the eye on to where it is now.
     fn advance(&mut self, now: Instant) {
         if let Some(camera) = self.tour.camera(now) {
@@ -441,12 +430,12 @@ impl Live {
             self.walker.advance(Duration::from_millis(if self.walker.is_moving() { 10 } else { 0 }));
         }
         self.walker.view.fov_x = self.settings.fov_x;
-        let (view, size) = (&self.walker.view, [self.config.width, self.config.height]);
+        let (view, size) = (&self.walker.view, self.canvas.size());
         self.tour.note(now, || view.camera(size));
     }
 
     fn redraw(&mut self) -> Result<(), WindowError> {
-        let size = [self.config.width, self.config.height];
+        let size = self.canvas.size();
         if size.contains(&0) {
             self.last_frame = None;
             return Ok(());
@@ -454,8 +443,15 @@ impl Live {
         let begin = Instant::now();
         self.advance(begin);
         self.follow(size);
-        let Some(output) = self.next_output()? else {
-            return Ok(());
+        let output = match self.canvas.next(&self.gpu, &self.window)? {
+            Output::Image(output) => output,
+            Output::Later { soon } => {
+                if soon {
+                    self.window.request_redraw();
+                }
+                self.last_frame = None;
+                return self.gpu.fault();
+            }
         };
         let (mesh, gauge) = (self.walk.mesh(), self.gauge());
         let facts = Facts {
@@ -505,38 +501,9 @@ impl Live {
         self.walked.evaluated += evaluated as u64;
     }
 
-    /// The next image to draw on; `None` where this frame is to be left out.
-    fn next_output(&mut self) -> Result<Option<wgpu::SurfaceTexture>, WindowError> {
-        use wgpu::CurrentSurfaceTexture as Current;
-        match self.surface.get_current_texture() {
-            Current::Success(output) => return Ok(Some(output)),
-            Current::Suboptimal(output) => {
-                // Good enough for now; the resize that it announces brings a new configuration.
-                return Ok(Some(output));
-            }
-            Current::Timeout => self.window.request_redraw(),
-            // The window system tells when it is seen again.
-            Current::Occluded => {}
-            Current::Outdated => {
-                self.configure();
-                self.window.request_redraw();
-            }
-            Current::Lost => {
-                self.surface = self.gpu.surface(&self.window)?;
-                self.config = configuration(&self.gpu, &self.surface, &self.window)?;
-                self.configure();
-                self.window.request_redraw();
-            }
-            Current::Validation => {}
-        }
-        self.last_frame = None;
-        self.gpu.fault()?;
-        Ok(None)
-    }
-
     /// Saves what is seen, without the head-up display, beside the other screenshots in the current folder.
     fn screenshot(&mut self) -> Result<(), WindowError> {
-        let size = [self.config.width, self.config.height];
+        let size = self.canvas.size();
         if size.contains(&0) {
             return Ok(());
         }
@@ -566,28 +533,4 @@ fn title(name: &str, status: &Status) -> String {
         Some(_) => format!("{name} — {:.0} % — hr-view", 100.0 * status.fraction),
         None => format!("{name} — hr-view"),
     }
-}
-
-/// How the surface is drawn on: 8 bits, encoded by our own shader where possible, as egui prefers, without tearing.
-fn configuration(
-    gpu: &Gpu,
-    surface: &wgpu::Surface<'_>,
-    window: &Window,
-) -> Result<wgpu::SurfaceConfiguration, WindowError> {
-    use wgpu::TextureFormat::{Bgra8Unorm, Bgra8UnormSrgb, Rgba8Unorm, Rgba8UnormSrgb};
-    let size = window.inner_size();
-    let formats = surface.get_capabilities(&gpu.adapter).formats;
-    let wanted = [Bgra8Unorm, Rgba8Unorm, Bgra8UnormSrgb, Rgba8UnormSrgb];
-    let format = wanted.into_iter().find(|f| formats.contains(f)).or_else(|| formats.first().copied());
-    let limit = gpu.device.limits().max_texture_dimension_2d;
-    let none = || WindowError::NoAdapter("it cannot draw on this window".into());
-    let format = format.ok_or_else(none)?;
-    let config = surface.get_default_config(&gpu.adapter, size.width, size.height).ok_or_else(none)?;
-    Ok(wgpu::SurfaceConfiguration {
-        format,
-        width: size.width.min(limit),
-        height: size.height.min(limit),
-        present_mode: wgpu::PresentMode::AutoVsync,
-        ..config
-    })
 }
