@@ -1,7 +1,7 @@
 //! A window with a solver behind it: the solution gets better while one walks through it.
 //!
 //! One thread solves, in a rayon pool of its own, so that the window never waits for it. It first shows what the scene
-//! looks like with hardly any light transport, then a coarse solution, then the one asked for; what the user wants
+//! looks like with hardly any light transport, then a sketch of a solution, then the one asked for; what the user wants
 //! meanwhile it learns between two steps of the solver. Every solution is solved for anew: the old one stays in the
 //! window until then.
 
@@ -19,7 +19,7 @@ use crate::stats::Times;
 use crate::walkthrough::Walkthrough;
 use crate::watched::Watched;
 use crate::window::{self, Screen, Status, WindowOptions, Wish};
-use hr_diffuse::{Budget, Settings};
+use hr_diffuse::{Budget, Phase, Settings};
 use hr_scene::{Material, Rgb, Scene};
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
@@ -34,7 +34,7 @@ const COARSEST: f32 = 1.0;
 /// How often the scene's file is looked at.
 const LOOK: Duration = Duration::from_millis(700);
 /// The window is told of progress no more often than this.
-const TELL: Duration = Duration::from_millis(250);
+const TELL: Duration = Duration::from_millis(500);
 
 /// Opens a window and solves for what is seen in it, until it is closed. Then statistics and solution are written, if
 /// that is asked for and was not done before: they are as soon as the accuracy asked for is reached.
@@ -92,6 +92,9 @@ enum Task {
     Load,
     /// Show it with what light there is at once.
     Glance,
+    /// Solve to an error and show it soon: without directional light that no link asks for, and with values at vertices
+    /// as exact as there is patience for. Both may take longer than all the rest.
+    Sketch(f32),
     /// Solve to an error; shown if it is better than what is shown, or in any case.
     Solve { error: f32, in_any_case: bool },
 }
@@ -207,14 +210,22 @@ impl Session {
         self.wanted = Wanted::Whole;
         match task {
             Task::Load => self.load(),
-            Task::Glance => self.solve(COARSEST, Some(Duration::ZERO), true),
-            Task::Solve { error, in_any_case } => {
-                let budget = self.args.time_budget.filter(|_| !in_any_case).map(Duration::from_secs_f64);
-                let left = budget.map(|budget| budget.saturating_sub(self.progress.elapsed()));
+            Task::Glance => self.solve(COARSEST, Some(Duration::ZERO), true, true),
+            Task::Sketch(error) => match self.time_left() {
                 // Where the time is up already, what there is has to do.
-                if left == Some(Duration::ZERO) { Ok(()) } else { self.solve(error, left, in_any_case) }
-            }
+                Some(Duration::ZERO) => Ok(()),
+                left => self.solve(error, left, false, true),
+            },
+            Task::Solve { error, in_any_case } => match if in_any_case { None } else { self.time_left() } {
+                Some(Duration::ZERO) => Ok(()),
+                left => self.solve(error, left, in_any_case, false),
+            },
         }
+    }
+
+    /// What is left of the time that the command line gives.
+    fn time_left(&self) -> Option<Duration> {
+        self.args.time_budget.map(|budget| Duration::from_secs_f64(budget).saturating_sub(self.progress.elapsed()))
     }
 
     fn load(&mut self) -> Result<(), ViewError> {
@@ -232,14 +243,20 @@ impl Session {
         self.tasks.push_back(Task::Glance);
         let coarse = self.status.asked * COARSER;
         if coarse <= COARSEST {
-            self.tasks.push_back(Task::Solve { error: coarse, in_any_case: false });
+            self.tasks.push_back(Task::Sketch(coarse));
         }
         self.tasks.push_back(Task::Solve { error: self.status.asked, in_any_case: false });
         Ok(())
     }
 
     /// Solves and shows the result, if it is worth showing.
-    fn solve(&mut self, error: f32, time: Option<Duration>, in_any_case: bool) -> Result<(), ViewError> {
+    fn solve(
+        &mut self,
+        error: f32,
+        time: Option<Duration>,
+        in_any_case: bool,
+        is_sketch: bool,
+    ) -> Result<(), ViewError> {
         let Some(scene) = self.scene.clone() else { return Ok(()) };
         self.begin("building the hierarchy");
         let is_glance = time == Some(Duration::ZERO);
@@ -248,9 +265,11 @@ impl Session {
         let mirrors = || scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
         let wants_distributions = self.args.mode == Mode::Distributions || self.args.save.is_some() || mirrors();
         self.interrupt = Some(Interrupt::listen());
-        let found = Solved::awaited(Arc::clone(&scene), settings, wants_distributions && !is_glance, &mut |state| {
-            self.attend(state)
-        });
+        let ask = &mut |state: &hr_diffuse::Progress| match self.attend(state) {
+            Wanted::Whole if is_sketch && state.phase == Phase::Reconstruct => Wanted::Now,
+            wanted => wanted,
+        };
+        let found = Solved::awaited(Arc::clone(&scene), settings, wants_distributions && !is_sketch, ask);
         self.interrupt = None;
         let (solved, mut accuracy) = found?;
         accuracy.asked = self.status.asked;
@@ -409,5 +428,5 @@ impl Session {
 fn step_back(_: usize) {
     // On Linux it is the thread's own, elsewhere the process's.
     #[cfg(target_os = "linux")]
-    let _niceness = rustix::process::nice(10);
+    let _niceness = rustix::process::nice(5);
 }
