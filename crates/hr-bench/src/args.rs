@@ -34,6 +34,8 @@ pub enum Command {
     Visibility(VisibilityArgs),
     /// The paper's tables 1 to 4 and figures 4 and 7, made anew: a Markdown page with pictures
     Paper(PaperArgs),
+    /// Time of frames along a walk, over the share of glossy vertices and the tolerance of their renewal: Markdown tables
+    View(ViewArgs),
 }
 
 /// Of `hr-bench reference`.
@@ -226,6 +228,50 @@ pub struct PaperArgs {
     /// Where paper-tables.md and its pictures go
     #[arg(long, value_name = "DIR", default_value = "target/hr-bench")]
     pub out: PathBuf,
+}
+
+/// Of `hr-bench view`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct ViewArgs {
+    /// A scene file or the name of a built-in scene
+    #[arg(value_name = "SCENE", default_value = hr_scene::builtin::DEFAULT)]
+    pub scene: String,
+
+    /// The walk, as hr-view records it; the scene's own where this is not given
+    #[arg(long, value_name = "FILE.json")]
+    pub path: Option<PathBuf>,
+
+    /// Error to solve to
+    #[arg(long, value_name = "E", default_value_t = 0.15)]
+    pub error: f32,
+
+    /// A solution of the scene that hr-view --save kept, instead of solving
+    #[arg(long, value_name = "IN")]
+    pub load: Option<PathBuf>,
+
+    /// How glossy light is shown
+    #[arg(long, value_name = "M", value_enum, default_value_t)]
+    pub mode: hr_view::Mode,
+
+    /// Frames of the walk
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub frames: u32,
+
+    /// Size of the frames in pixels
+    #[arg(long, value_name = "W", default_value_t = 1280, value_parser = clap::value_parser!(u32).range(1..=16384))]
+    pub width: u32,
+
+    /// The same
+    #[arg(long, value_name = "H", default_value_t = 720, value_parser = clap::value_parser!(u32).range(1..=16384))]
+    pub height: u32,
+
+    /// Changes of direction in degrees that glossy vertices are evaluated again for
+    #[arg(long, value_name = "DEGREES", value_delimiter = ',', default_values_t = [0.0, 1.0, 2.0, 5.0])]
+    pub tolerance: Vec<f32>,
+
+    /// Shares of the glossy vertices that follow the eye; the others look as they do without
+    #[arg(long, value_name = "S", value_delimiter = ',', default_values_t = [0.0, 0.25, 0.5, 1.0])]
+    pub share: Vec<f32>,
 }
 
 #[cfg(test)]

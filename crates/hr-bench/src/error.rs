@@ -46,6 +46,12 @@ pub enum BenchError {
     /// Two images cannot be compared.
     #[error("cannot compare: {0}")]
     Compare(String),
+    /// A kept solution cannot be used.
+    #[error(transparent)]
+    Solution(#[from] hr_view::solution_file::SolutionError),
+    /// Frames cannot be drawn.
+    #[error(transparent)]
+    Window(#[from] hr_view::window::WindowError),
     /// A file cannot be written.
     #[error("{path}: cannot be written: {source}", path = path.display())]
     Write {

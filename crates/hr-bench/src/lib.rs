@@ -12,6 +12,7 @@
 //! | `form-factors` | form factors against closed forms and brute force |
 //! | `visibility` | rays per second |
 //! | `paper` | what the paper's tables and figures compare |
+//! | `view` | time of frames along a walk |
 
 pub mod accuracy;
 pub mod args;
@@ -20,6 +21,7 @@ pub mod curve;
 pub mod error;
 pub mod float_image;
 pub mod form_factors;
+pub mod frames;
 pub mod growth;
 pub mod irradiance;
 pub mod measure;

@@ -2,22 +2,22 @@
 
 use crate::ViewError;
 use crate::args::Args;
+use crate::camera_path::CameraPath;
 use crate::export;
 use crate::glossy::Mode;
 use crate::html;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::raycast::RayCaster;
+use crate::session;
 use crate::solution_file::{self, Accuracy};
-use crate::solved::Solved;
+use crate::solved::{Solved, Wanted};
 use crate::stats::{Times, stats};
-use crate::walkthrough::Walkthrough;
-use crate::window::{self, WindowError, WindowOptions};
+use crate::window::WindowError;
 use hr_diffuse::{Budget, Phase, Settings};
 use hr_scene::whole_file::write_whole;
 use hr_scene::{Camera, Exposure, ImageKind, Rgb, Scene, SceneError, ToneMap};
 use std::io::Write;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -35,11 +35,11 @@ const METER_SIZE: [u32; 2] = [64, 40];
 /// Where frames go when there is no window and nobody said where.
 const FALLBACK_FRAMES: &str = "hr-view-frames";
 
+/// What Ctrl-C is answered with.
+pub(crate) const STOPPING: &str = "stopping, this shows what there is; Ctrl-C again ends the program";
+
 /// So many warnings about the scene are told; of the others, how many there are.
 const MOST_WARNINGS: usize = 8;
-
-/// Values at vertices after a solve that was stopped may take this much longer than the solve took, and a second.
-const PATIENCE: f64 = 0.5;
 
 /// How a solution is to be shown.
 enum Output {
@@ -93,7 +93,7 @@ fn make_folder(folder: &Path) -> Result<(), SceneError> {
 /// What there is to show, and how.
 struct Show<'a> {
     args: &'a Args,
-    solved: Solved,
+    solved: &'a Solved,
     accuracy: Accuracy,
     progress: &'a Progress,
     /// Time that loading took, and when showing began.
@@ -107,22 +107,36 @@ struct Show<'a> {
 /// Anything that keeps it from being done; the text is one line for the user.
 pub fn run(args: &Args) -> Result<(), ViewError> {
     let output = Output::of(args)?;
-    let progress = Progress::new();
+    let progress = Arc::new(Progress::new());
     if let Some(threads) = args.threads {
         // For all of the process: the window's thread cannot be one of a pool of its own.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
         pool.map_err(|error| ViewError::Arguments(format!("--threads {threads}: {error}; ask for fewer")))?;
     }
+    // The window records to a file that is not there yet.
+    let path = args.path.as_deref().filter(|path| path.exists() || !matches!(output, Output::Window));
+    let path = path.map(CameraPath::load).transpose()?.unwrap_or_default();
+    let (output, why) = match output {
+        Output::Window => match session::window(args, &path, &progress) {
+            Ok(()) => return Ok(()),
+            Err(ViewError::Window(error @ (WindowError::NoDisplay(_) | WindowError::NoAdapter(_)))) => {
+                (Output::Frames(FALLBACK_FRAMES.into()), Some(error))
+            }
+            Err(error) => return Err(error),
+        },
+        output => (output, None),
+    };
     let scene = load(args, &progress)?;
+    if let Some(why) = why {
+        progress.say(&format!("{why}; writing frames to {FALLBACK_FRAMES} instead"));
+    }
     let loaded = progress.elapsed();
     let (solved, accuracy) = match &args.load {
         Some(path) => solution_file::load(path, scene)?,
         None => {
-            // The window shows mirrors by their distributions in any mode; what is kept is for every mode.
-            let mirrors = scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
-            let shown = args.mode == Mode::Distributions || mirrors && matches!(output, Output::Window);
             let begun = args.resume.as_deref().map(|path| solution_file::load(path, Arc::clone(&scene))).transpose()?;
-            solve(scene, begun, args, shown || args.save.is_some(), &progress)?
+            // What is kept is for every mode.
+            solve(scene, begun, args, args.mode == Mode::Distributions || args.save.is_some(), &progress)?
         }
     };
     if let Some(path) = &args.save {
@@ -130,18 +144,18 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
         solution_file::save(path, &solved, accuracy)?;
     }
     let begin = progress.elapsed();
-    let show = Show { args, solved, accuracy, progress: &progress, loaded, begin };
+    let show = Show { args, solved: &solved, accuracy, progress: &progress, loaded, begin };
     match output {
-        Output::Window => show.window(),
-        Output::Image(path) => show.image(&path),
-        Output::Frames(folder) => show.frames(&folder),
-        Output::Html(path) => show.html(&path),
-        Output::Export(path) => show.export(&path),
+        Output::Image(file) => show.image(&file),
+        Output::Html(file) => show.html(&file),
+        Output::Export(file) => show.export(&file),
+        Output::Frames(folder) => show.frames(&folder, &path),
+        Output::Window => Ok(()),
     }
 }
 
 /// The scene, with the camera of the command line first.
-fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
+pub(crate) fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
     progress.at(&format!("loading {}", args.scene), 0.0);
     // The camera first: it is read at once, and a mistake in it shows before the wait for a large scene.
     let camera = args.camera.as_deref().map(Camera::load).transpose()?;
@@ -161,8 +175,8 @@ fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
     Ok(Arc::new(scene))
 }
 
-/// Solves for the light, or goes on with what was begun, to the accuracy asked for, or until the time is up or the user has seen enough. Also tells
-/// how exact the solution is.
+/// Solves for the light, or goes on with what was begun, to the accuracy asked for, or until the time is up or the user has
+/// seen enough. Also tells how exact the solution is.
 fn solve(
     scene: Arc<Scene>,
     begun: Option<(Solved, Accuracy)>,
@@ -170,55 +184,25 @@ fn solve(
     distributions: bool,
     progress: &Progress,
 ) -> Result<(Solved, Accuracy), ViewError> {
-    let budget = args.time_budget.map(Duration::from_secs_f64);
     let interrupt = Interrupt::listen();
-    let (mut error, mut stopped) = (begun.as_ref().map_or(1.0, |(_, accuracy)| accuracy.believed), false);
-    // When values at vertices have to be done, after a solve that was stopped.
-    let mut latest = None;
-    let patient = |from: Duration| from.mul_f64(1.0 + PATIENCE) + Duration::from_secs(1);
-    let watch = &mut |state: &hr_diffuse::Progress| {
-        let now = progress.elapsed();
+    let mut stopped = false;
+    let ask = &mut |state: &hr_diffuse::Progress| {
         progress.solving(state);
-        if state.phase != Phase::Reconstruct {
-            error = state.error;
-            if interrupt.is_raised() && !stopped {
-                progress.say("stopping, this shows what there is; Ctrl-C again ends the program");
-            }
-            // The solver itself keeps to the budget; this is for the final reflection.
-            stopped |= interrupt.is_raised() || budget.is_some_and(|budget| now >= patient(budget));
-            return if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        if interrupt.is_raised() && !stopped && state.phase != Phase::Reconstruct {
+            progress.say(STOPPING);
+            stopped = true;
         }
-        let latest = *latest.get_or_insert(patient(now));
-        let late = stopped || budget.is_some_and(|budget| now >= budget);
-        if late && now >= latest { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if stopped { Wanted::Now } else { Wanted::Whole }
     };
-    let time = budget.map(|budget| budget.saturating_sub(progress.elapsed()));
+    let time = args.time_budget.map(|budget| Duration::from_secs_f64(budget).saturating_sub(progress.elapsed()));
     let settings = Settings { error: args.error, budget: Budget { time, ..Budget::default() } };
-    let solved = match begun {
-        Some((solved, _)) => solved.resume(settings, distributions, watch)?,
-        None => Solved::new(scene, settings, distributions, watch)?,
-    };
-    Ok((solved, Accuracy { asked: args.error, believed: error }))
+    Ok(match begun {
+        Some((solved, accuracy)) => solved.resumed(settings, distributions, accuracy, ask)?,
+        None => Solved::awaited(scene, settings, distributions, ask)?,
+    })
 }
 
 impl Show<'_> {
-    /// A window, or frames where none can be opened.
-    fn window(&self) -> Result<(), ViewError> {
-        self.progress.at("making triangles", 0.0);
-        let walkthrough = Walkthrough::new(&self.solved, self.args.mode);
-        // Before the window opens: how long somebody looks is not the program's time.
-        self.write_stats()?;
-        self.progress.clear();
-        match window::open(&walkthrough, &WindowOptions::default()) {
-            Ok(()) => Ok(()),
-            Err(error @ (WindowError::NoDisplay(_) | WindowError::NoAdapter(_))) => {
-                self.progress.say(&format!("{error}; writing frames to {FALLBACK_FRAMES} instead"));
-                self.frames(Path::new(FALLBACK_FRAMES))
-            }
-            Err(error) => Err(error.into()),
-        }
-    }
-
     fn image(&self, path: &Path) -> Result<(), ViewError> {
         let scene = &self.solved.scene;
         let watch = |share| self.progress.at("taking the picture", share);
@@ -229,18 +213,18 @@ impl Show<'_> {
 
     fn html(&self, path: &Path) -> Result<(), ViewError> {
         self.progress.at("writing the page", 0.0);
-        html::write(&self.solved, path)?;
+        html::write(self.solved, path)?;
         self.write_stats()
     }
 
     fn export(&self, path: &Path) -> Result<(), ViewError> {
         self.progress.at("writing the solution", 0.0);
-        export::write(&self.solved, path)?;
+        export::write(self.solved, path)?;
         self.write_stats()
     }
 
     /// Numbered PNG files, all exposed alike.
-    fn frames(&self, folder: &Path) -> Result<(), ViewError> {
+    fn frames(&self, folder: &Path, path: &CameraPath) -> Result<(), ViewError> {
         make_folder(folder)?;
         let scene = &self.solved.scene;
         let caster = self.caster().with_grid(FRAME_GRID);
@@ -249,16 +233,17 @@ impl Show<'_> {
             camera
         };
         let meter = self.caster().with_grid(1);
-        let metered: Vec<Rgb> = scene
-            .walkthrough(METERED)
+        let walk = |count| if path.is_empty() { scene.walkthrough(count) } else { path.cameras(count) };
+        let metered: Vec<Rgb> = walk(METERED)
             .into_iter()
             .flat_map(|camera| meter.render(&resized(camera, METER_SIZE), &|_| ()).pixels)
             .collect();
         let exposure = Exposure::Factor(ToneMap::default().factor(&metered, scene.primaries));
         let tone_map = ToneMap { exposure, ..ToneMap::default() };
-        for (number, camera) in scene.walkthrough(FRAMES).into_iter().enumerate() {
+        for (number, camera) in walk(FRAMES).into_iter().enumerate() {
             let watch = |share| self.progress.at("writing frames", (number as f32 + share) / FRAMES as f32);
-            let camera = if self.args.camera.is_some() { camera } else { resized(camera, FRAME_SIZE) };
+            let camera =
+                if self.args.camera.is_some() || !path.is_empty() { camera } else { resized(camera, FRAME_SIZE) };
             let image = caster.render(&camera, &watch);
             image.save(&folder.join(format!("frame-{number:04}.png")), &tone_map, scene.primaries)?;
         }
@@ -276,11 +261,16 @@ impl Show<'_> {
         let now = self.progress.elapsed();
         let times =
             Times { load: self.loaded.as_secs_f64(), show: (now - self.begin).as_secs_f64(), total: now.as_secs_f64() };
-        let stats = stats(&self.solved, self.accuracy, &times);
-        write_whole(path, |out| {
-            serde_json::to_writer_pretty(&mut *out, &stats)?;
-            writeln!(out)
-        })?;
-        Ok(())
+        write_stats(path, self.solved, self.accuracy, &times)
     }
+}
+
+/// Writes the statistics of a solution.
+pub(crate) fn write_stats(path: &Path, solved: &Solved, accuracy: Accuracy, times: &Times) -> Result<(), ViewError> {
+    let stats = stats(solved, accuracy, times);
+    write_whole(path, |out| {
+        serde_json::to_writer_pretty(&mut *out, &stats)?;
+        writeln!(out)
+    })?;
+    Ok(())
 }

@@ -12,8 +12,8 @@ const CAMERA_HELP: &str =
 
 /// Walk through the global illumination of a scene, glossy reflection included.
 ///
-/// The scene is solved once, to the accuracy asked for; then a window opens and you walk. H in the window shows the
-/// keys.
+/// A window opens, the scene is solved behind it, and you walk while the solution gets better, until it has the
+/// accuracy asked for. H in the window shows the keys.
 #[derive(Clone, Debug, PartialEq, Parser)]
 #[command(name = "hr-view", version)]
 pub struct Args {
@@ -32,6 +32,10 @@ pub struct Args {
     /// No window: PNG frames along the walkthrough's camera path
     #[arg(long, value_name = "DIR", conflicts_with = "image")]
     pub frames: Option<PathBuf>,
+
+    /// A camera path: played by V in the window, which records to it, and followed by --frames
+    #[arg(long, value_name = "FILE.json")]
+    pub path: Option<PathBuf>,
 
     /// How glossy light is shown
     #[arg(long, value_name = "M", value_enum, default_value_t)]
@@ -175,6 +179,7 @@ mod tests {
         assert_eq!(run("--save s.hrs").save, Some("s.hrs".into()), "save");
         assert_eq!(run("room --load s.hrs --threads 2").load, Some("s.hrs".into()), "load");
         assert_eq!(run("--export light.glb").export, Some("light.glb".into()), "export");
+        assert_eq!(run("--frames out --path p.json").path, Some("p.json".into()), "path");
         assert_eq!(run("--frames out").frames, Some("out".into()), "frames");
     }
 

@@ -4,6 +4,8 @@
 //! vertex and never computed again; radiance that follows the eye is asked for, vertex by vertex, with
 //! [`Walkable::glossy_radiance`].
 
+use crate::camera_path::CameraPath;
+use crate::inside::Inside;
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::Rgb;
 use hr_scene::{Camera, Primaries, Texture};
@@ -168,6 +170,16 @@ pub trait Walkable: Send + Sync {
 
     /// Named cameras, in the order of the digit keys; may be empty.
     fn cameras(&self) -> &[(String, Camera)];
+
+    /// A walk to play; empty where there is none.
+    fn tour(&self) -> CameraPath {
+        CameraPath::default()
+    }
+
+    /// What lies behind the picture, where it can be looked into.
+    fn inside(&self) -> Option<Box<dyn Inside + '_>> {
+        None
+    }
 
     /// The direction that stays up while walking, unit length: by default the coordinate axis nearest to the first
     /// camera's up, and z without a camera.

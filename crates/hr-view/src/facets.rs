@@ -25,14 +25,16 @@ pub struct Roundness {
 }
 
 impl Roundness {
-    /// 8°, or 20° within 0.5 mm in a room of 10 m.
-    pub const SMOOTH: Self = Self { fine: 0.14, flat_enough: 5e-5, coarse: 0.35 };
+    /// 8°, or 23° (a sixteenth of a turn, as halving makes them) within 0.5 mm in a room of 10 m.
+    pub const SMOOTH: Self = Self { fine: 0.14, flat_enough: 5e-5, coarse: 0.4 };
 }
 
 /// Edges this near to their surface (unit space) are never cut: rounding bends very short ones at random.
 const NEGLIGIBLE: f32 = 1e-6;
-/// A triangle is halved at most so often: each of its edges 8 times, a full turn to less than a degree and a half.
-const MOST_CUTS: u32 = 24;
+/// An edge is halved at most so often: a full turn to less than a degree and a half.
+const MOST_CUTS: u32 = 8;
+/// Nearer than this to a side of a domain (share of its breadth) is on it.
+const ON_SIDE: f32 = 1e-6;
 /// No index.
 const NONE: u32 = u32::MAX;
 
@@ -74,8 +76,6 @@ struct Bend {
     uv: Vec2,
     /// On the surface, in unit space.
     at: Vec3,
-    /// From the edge, in unit space.
-    distance: f32,
 }
 
 /// What the triangles of one leaf have in common.
@@ -174,49 +174,119 @@ impl<'a> Maker<'a> {
         };
         let fan = solution.vertices.fan(leaf);
         let Some((middle, outline)) = fan.split_first() else { return };
-        let middle = self.point(&look, middle);
+        if is_round(geometry) {
+            return self.round_leaf(&look, outline, element.domain);
+        }
+        let middle = self.vertex(&look, middle.vertex, middle.uv);
+        let outline: Vec<u32> = outline.iter().map(|c| self.vertex(&look, c.vertex, c.uv)).collect();
+        for (i, &a) in outline.iter().enumerate() {
+            self.emit(&look, [middle, a, outline[(i + 1) % outline.len()]]);
+        }
+    }
+
+    /// A leaf of a curved surface: its outline, cut where its edges leave the surface, a grid within, and a strip of
+    /// triangles between them.
+    fn round_leaf(&mut self, look: &Look, outline: &[Corner], domain: Domain) {
+        let solution = self.solution;
         // Of an edge that is one point, such as a pole, the ends are enough.
         let inner = |i: usize| {
             let corner = &outline[i];
             let beside = [outline[(i + outline.len() - 1) % outline.len()], outline[(i + 1) % outline.len()]];
             beside.iter().all(|next| {
-                let between = geometry.point(0.5 * (corner.uv + next.uv));
+                let between = look.geometry.point(0.5 * (corner.uv + next.uv));
                 next.vertex == corner.vertex
                     && between.distance(solution.vertices.positions[corner.vertex as usize]) < NEGLIGIBLE
             })
         };
-        let outline: Vec<Point> =
-            (0..outline.len()).filter(|&i| !inner(i)).map(|i| self.point(&look, &outline[i])).collect();
-        let cuts = if is_round(geometry) { MOST_CUTS } else { 0 };
-        for (i, &a) in outline.iter().enumerate() {
-            self.triangle(&look, [middle, a, outline[(i + 1) % outline.len()]], cuts);
+        let corners: Vec<Point> =
+            (0..outline.len()).filter(|&i| !inner(i)).map(|i| self.point(look, &outline[i])).collect();
+        let mut edge = Vec::new();
+        for (i, a) in corners.iter().enumerate() {
+            self.cut(look, *a, corners[(i + 1) % corners.len()], MOST_CUTS, &mut edge);
         }
+        let mut outer: Vec<(f32, u32)> = edge.iter().map(|point| (around(&domain, point.uv), point.index)).collect();
+        outer.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let [columns, rows] = [self.steps(look, &domain, true), self.steps(look, &domain, false)];
+        // Points between the steps; one at least.
+        let [across, along] = [columns, rows].map(|steps| steps.max(2) - 1);
+        let mut grid = Vec::new();
+        for j in 1..=along {
+            for i in 1..=across {
+                let share = |i: u32, count: u32| i as f32 / (count + 1) as f32;
+                grid.push(self.interior(look, domain.lerp(share(i, across), share(j, along))));
+            }
+        }
+        let at = |i: u32, j: u32| grid[(j * across + i) as usize];
+        for j in 1..along {
+            for i in 1..across {
+                let [a, b, c, d] = [at(i - 1, j - 1), at(i, j - 1), at(i, j), at(i - 1, j)];
+                self.emit(look, [a, b, c]);
+                self.emit(look, [a, c, d]);
+            }
+        }
+        // The grid's edge, counter-clockwise like the outline.
+        let share = |i: u32, count: u32| if count > 1 { i as f32 / (count - 1) as f32 } else { 0.0 };
+        let bottom = (0..across).map(|i| (share(i, across), at(i, 0)));
+        let right = (0..along).map(|j| (1.0 + share(j, along), at(across - 1, j)));
+        let top = (0..across).rev().map(|i| (3.0 - share(i, across), at(i, along - 1)));
+        let left = (0..along).rev().map(|j| (4.0 - share(j, along), at(0, j)));
+        let ring: Vec<(f32, u32)> = bottom.chain(right).chain(top).chain(left).collect();
+        self.strip(look, &outer, &ring);
+    }
+
+    /// Triangles between two closed rings, whose points ascend around the domain.
+    fn strip(&mut self, look: &Look, outer: &[(f32, u32)], inner: &[(f32, u32)]) {
+        let (Some(&(_, first)), Some(&(_, within))) = (outer.first(), inner.first()) else { return };
+        let (mut i, mut j) = (1, 1);
+        let (mut a, mut b) = (first, within);
+        while i <= outer.len() || j <= inner.len() {
+            let end = |ring: &[(f32, u32)], at: usize, close: u32| match ring.get(at) {
+                Some(&next) => Some(next),
+                None => (at == ring.len()).then_some((4.0, close)),
+            };
+            let (out, in_) = (end(outer, i, first), end(inner, j, within));
+            // The outline goes first: at a corner the strip turns about the grid's.
+            if let Some((_, next)) = out.filter(|o| in_.is_none_or(|n| o.0 <= n.0)) {
+                self.emit(look, [a, next, b]);
+                (a, i) = (next, i + 1);
+            } else if let Some((_, next)) = in_ {
+                self.emit(look, [a, next, b]);
+                (b, j) = (next, j + 1);
+            }
+        }
+    }
+
+    /// The points of an edge, its end left out.
+    fn cut(&mut self, look: &Look, a: Point, b: Point, cuts: u32, out: &mut Vec<Point>) {
+        match self.bend(look, &a, &b).filter(|_| cuts > 0) {
+            Some(bend) => {
+                let middle = self.middle(look, &bend);
+                self.cut(look, a, middle, cuts - 1, out);
+                self.cut(look, middle, b, cuts - 1, out);
+            }
+            None => out.push(a),
+        }
+    }
+
+    /// Into how many steps, a power of two, the domain's lines along u or v are cut.
+    fn steps(&self, look: &Look, domain: &Domain, along_u: bool) -> u32 {
+        let leaves = |across: f32, steps: u32| {
+            let ends = [0.0, 1.0 / steps as f32].map(|share| {
+                let uv = if along_u { domain.lerp(share, across) } else { domain.lerp(across, share) };
+                Point { uv, at: look.geometry.point(uv), index: NONE }
+            });
+            self.bend(look, &ends[0], &ends[1]).is_some()
+        };
+        let mut steps = 1;
+        while steps < 1 << MOST_CUTS && [0.0, 0.5, 1.0].iter().any(|&across| leaves(across, steps)) {
+            steps *= 2;
+        }
+        steps
     }
 
     fn point(&mut self, look: &Look, corner: &Corner) -> Point {
         let at = self.solution.vertices.positions[corner.vertex as usize];
         Point { uv: corner.uv, at, index: self.vertex(look, corner.vertex, corner.uv) }
-    }
-
-    /// A triangle counter-clockwise in (u, v), which may be halved so many times more.
-    ///
-    /// Of the edges that leave the surface too far the worst one is cut: around a cylinder that makes few triangles, all of
-    /// its length. The others are cut later, so that in the end all such edges are.
-    fn triangle(&mut self, look: &Look, corners: [Point; 3], cuts: u32) {
-        // Nothing is left of what has an edge in a pole.
-        let is_point = |a: &Point, b: &Point| a.index == b.index && a.uv.y == b.uv.y && is_pole(look.geometry, a.uv);
-        if (0..3).any(|i| is_point(&corners[i], &corners[(i + 1) % 3])) {
-            return;
-        }
-        let bends = (0..3).filter_map(|i| Some((i, self.bend(look, &corners[i], &corners[(i + 1) % 3])?)));
-        let worst = bends.max_by(|(_, a), (_, b)| a.distance.total_cmp(&b.distance)).filter(|_| cuts > 0);
-        let Some((edge, bend)) = worst else {
-            return self.emit(look, corners.map(|corner| corner.index));
-        };
-        let [a, b, c] = [0, 1, 2].map(|i| corners[(edge + i) % 3]);
-        let middle = self.middle(look, &bend);
-        self.triangle(look, [middle, b, c], cuts - 1);
-        self.triangle(look, [a, middle, c], cuts - 1);
     }
 
     /// How an edge leaves the surface; `None` where that is little enough.
@@ -237,22 +307,17 @@ impl<'a> Maker<'a> {
         let angle = if length > 0.0 { 8.0 * distance / length } else { f32::INFINITY };
         let Roundness { fine, flat_enough, coarse } = self.roundness;
         let much = distance >= NEGLIGIBLE && angle >= if distance < flat_enough { coarse } else { fine };
-        much.then_some(Bend { uv, at, distance })
+        much.then_some(Bend { uv, at })
     }
 
     /// The vertex in the middle of an edge that is cut.
-    fn middle(&mut self, look: &Look, &Bend { uv, at, .. }: &Bend) -> Point {
+    fn middle(&mut self, look: &Look, &Bend { uv, at }: &Bend) -> Point {
         // Adding zero makes −0 the same as 0.
         let key = ((at + Vec3::ZERO).to_array().map(f32::to_bits), look.surface, look.back);
         let index = match self.cut.get(&key) {
             Some(&index) => index,
             None => {
-                let corners = self.solution.vertices.interpolation(look.leaf, uv);
-                let irradiance = &self.solution.vertices.irradiance;
-                let light = corners.iter().map(|&(vertex, weight)| irradiance[vertex as usize] * weight).sum();
-                let side = if look.back { -1.0 } else { 1.0 };
-                let normal = self.solution.scene.shading_normal(look.surface, uv) * side;
-                let index = self.add(look, at, normal, light, Source { leaf: look.leaf, uv, corners });
+                let index = self.interior(look, uv);
                 self.cut.insert(key, index);
                 index
             }
@@ -260,6 +325,18 @@ impl<'a> Maker<'a> {
         Point { uv, at, index }
     }
 
+    /// A vertex somewhere on the leaf.
+    fn interior(&mut self, look: &Look, uv: Vec2) -> u32 {
+        let corners = self.solution.vertices.interpolation(look.leaf, uv);
+        let irradiance = &self.solution.vertices.irradiance;
+        let light = corners.iter().map(|&(vertex, weight)| irradiance[vertex as usize] * weight).sum();
+        let side = if look.back { -1.0 } else { 1.0 };
+        let normal = self.solution.scene.shading_normal(look.surface, uv) * side;
+        let at = look.geometry.point(uv);
+        self.add(look, at, normal, light, Source { leaf: look.leaf, uv, corners })
+    }
+
+    /// Counter-clockwise in (u, v).
     fn emit(&mut self, look: &Look, [a, b, c]: [u32; 3]) {
         if a == b || b == c || c == a {
             return;
@@ -381,6 +458,25 @@ impl<'a> Maker<'a> {
             }
         }
         (mesh, self.sources)
+    }
+}
+
+/// Where a point of a domain's outline is, going around it counter-clockwise from its first corner: 0…4.
+fn around(domain: &Domain, uv: Vec2) -> f32 {
+    let s = (uv.x - domain.u0) / (domain.u1 - domain.u0);
+    let t = (uv.y - domain.v0) / (domain.v1 - domain.v0);
+    let off = [t, 1.0 - s, 1.0 - t, s].map(f32::abs);
+    let nearest = off.iter().copied().fold(f32::INFINITY, f32::min);
+    // Corners belong to the side that begins there; the last one is the first.
+    let is_on = |side: usize| off[side] <= nearest + ON_SIDE;
+    if is_on(3) && !is_on(0) {
+        4.0 - t
+    } else if is_on(2) && !is_on(3) {
+        3.0 - s
+    } else if is_on(1) && !is_on(2) {
+        1.0 + t
+    } else {
+        s
     }
 }
 

@@ -27,7 +27,12 @@ pub enum Mode {
 ///
 /// The leaf's distribution is that of its own normal. What the place reflects toward `away` comes from the mirrored
 /// direction; the leaf reflects the same toward another one, which is where its distribution is asked.
-fn leaving<B: Basis>(solution: &Solution<GlossyField<B>>, leaf: NodeId, normal: Vec3, away: Vec3) -> (Rgb, f32) {
+pub(crate) fn leaving<B: Basis>(
+    solution: &Solution<GlossyField<B>>,
+    leaf: NodeId,
+    normal: Vec3,
+    away: Vec3,
+) -> (Rgb, f32) {
     let element = &solution.elements.nodes[leaf.index()];
     let axis = element.normals.axis;
     let mirrored = away.reflect(normal);
@@ -68,8 +73,18 @@ pub fn interpolated<B: Basis>(
     normal: Vec3,
     away: Vec3,
 ) -> Rgb {
+    blended(solution, shares(solution, corners), normal, away)
+}
+
+/// The same from leaves and their shares, as [`shares`] gives them.
+pub(crate) fn blended<B: Basis>(
+    solution: &Solution<GlossyField<B>>,
+    leaves: impl IntoIterator<Item = (u32, f32)>,
+    normal: Vec3,
+    away: Vec3,
+) -> Rgb {
     let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
-    for (leaf, share) in shares(solution, corners) {
+    for (leaf, share) in leaves {
         let (light, weight) = leaving(solution, NodeId(leaf), normal, away);
         sum += light * weight * share;
         weights += weight * share;

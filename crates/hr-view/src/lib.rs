@@ -2,20 +2,25 @@
 
 pub mod app;
 pub mod args;
+pub mod camera_path;
 pub mod display;
+mod edits;
 pub mod error;
 pub mod export;
 pub mod facets;
 pub mod glossy;
 pub mod html;
+pub mod inside;
 pub mod interrupt;
 pub mod path_tracer;
 pub mod progress;
 pub mod raycast;
+mod session;
 pub mod solution_file;
 pub mod solved;
 pub mod stats;
 pub mod walkthrough;
+mod watched;
 pub mod window;
 
 pub use args::{Args, Parsed};

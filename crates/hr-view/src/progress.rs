@@ -58,14 +58,8 @@ impl Progress {
 
     /// Says how far a solve is: links, and the relative error that the solution is believed to have.
     pub fn solving(&self, state: &hr_diffuse::Progress) {
-        let activity = match state.phase {
-            Phase::Refine => "refining links",
-            Phase::Transport => "transporting light",
-            Phase::Reconstruct => "values at vertices",
-            _ => "solving",
-        };
-        let detail = || format!(": {}, error about {:.2} %", links(state.links), 100.0 * state.error);
-        self.tell(activity, state.fraction, detail);
+        let detail = || format!(": {}", details(state));
+        self.tell(phase(state), state.fraction, detail);
     }
 
     /// Says what is being done and how far it is (0…1). May be called often and from any thread.
@@ -127,6 +121,24 @@ impl Drop for Progress {
     fn drop(&mut self) {
         self.clear();
     }
+}
+
+/// What the solver is doing, with the error that is believed to be left, and links.
+pub(crate) fn activity(state: &hr_diffuse::Progress) -> String {
+    format!("{}: {}", phase(state), details(state))
+}
+
+fn phase(state: &hr_diffuse::Progress) -> &'static str {
+    match state.phase {
+        Phase::Refine => "refining links",
+        Phase::Transport => "transporting light",
+        Phase::Reconstruct => "values at vertices",
+        _ => "solving",
+    }
+}
+
+fn details(state: &hr_diffuse::Progress) -> String {
+    format!("{}, error about {:.2} %", links(state.links), 100.0 * state.error)
 }
 
 /// A number of links, short.

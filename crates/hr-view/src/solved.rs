@@ -1,11 +1,27 @@
 //! From a scene to its solution.
 
+use crate::solution_file::Accuracy;
 use glossy_ext::GlossyField;
 use glossy_ext::haar::Refinement;
-use hr_diffuse::{Progress, Settings, Solution, SolveError, Solver};
+use hr_diffuse::{Phase, Progress, Settings, Solution, SolveError, Solver};
 use hr_scene::Scene;
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Values at vertices after a solve that was stopped may take this much longer than the solve took, and a second.
+const PATIENCE: f64 = 0.5;
+
+/// What is wanted of a solution that is being made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// All of it.
+    Whole,
+    /// What there is by now.
+    Now,
+    /// Nothing any more, as soon as may be.
+    Nothing,
+}
 
 /// A scene and the light in it.
 #[derive(Debug)]
@@ -60,5 +76,67 @@ impl Solved {
         }
         let solution = solver.finish(watch);
         Self { scene, solution }
+    }
+
+    /// Like [`new`](Self::new), for one who waits for it and may want it sooner: `ask` is told how far it is and says what
+    /// is wanted now. Also tells how exact the solution is.
+    ///
+    /// # Errors
+    /// Where the scene makes no sense to the solver.
+    pub fn awaited(
+        scene: Arc<Scene>,
+        settings: Settings,
+        distributions: bool,
+        ask: &mut dyn FnMut(&Progress) -> Wanted,
+    ) -> Result<(Self, Accuracy), SolveError> {
+        Self::waiting(settings, 1.0, ask, |watch| Self::new(scene, settings, distributions, watch))
+    }
+
+    /// [`resume`](Self::resume), for as long as it is wanted, as [`awaited`](Self::awaited) does; `accuracy` is that of what was
+    /// solved before.
+    ///
+    /// # Errors
+    /// Where the error is out of range.
+    pub fn resumed(
+        self,
+        settings: Settings,
+        distributions: bool,
+        accuracy: Accuracy,
+        ask: &mut dyn FnMut(&Progress) -> Wanted,
+    ) -> Result<(Self, Accuracy), SolveError> {
+        Self::waiting(settings, accuracy.believed, ask, |watch| self.resume(settings, distributions, watch))
+    }
+
+    fn waiting(
+        settings: Settings,
+        mut error: f32,
+        ask: &mut dyn FnMut(&Progress) -> Wanted,
+        solve: impl FnOnce(&mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Self, SolveError>,
+    ) -> Result<(Self, Accuracy), SolveError> {
+        let begin = Instant::now();
+        let patient = |from: Duration| from.mul_f64(1.0 + PATIENCE) + Duration::from_secs(1);
+        let time = settings.budget.time;
+        let mut stopped = false;
+        // When values at vertices have to be done, after a solve that was stopped.
+        let mut latest = None;
+        let watch = &mut |state: &Progress| {
+            let now = begin.elapsed();
+            let wanted = ask(state);
+            stopped |= wanted != Wanted::Whole;
+            let over = if wanted == Wanted::Nothing {
+                true
+            } else if state.phase == Phase::Reconstruct {
+                let latest = *latest.get_or_insert(patient(now));
+                (stopped || time.is_some_and(|time| now >= time)) && now >= latest
+            } else {
+                error = state.error;
+                // The solver itself keeps to the budget; this is for the final reflection.
+                stopped |= time.is_some_and(|time| now >= patient(time));
+                stopped
+            };
+            if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let solved = solve(watch)?;
+        Ok((solved, Accuracy { asked: settings.error, believed: error }))
     }
 }

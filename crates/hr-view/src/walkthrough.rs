@@ -1,8 +1,10 @@
 //! A solution, ready to be walked through.
 
+use crate::camera_path::CameraPath;
 use crate::display::{DisplayMesh, Walkable};
 use crate::facets::{Roundness, Source, facets};
 use crate::glossy::{self, Mode};
+use crate::inside::{Anatomy, Inside};
 use crate::solved::Solved;
 use glam::{DVec3, Vec3};
 use glossy_ext::{Incident, Place};
@@ -14,23 +16,45 @@ use std::sync::Arc;
 /// in light transport, and so that a highlight between two vertices does not vanish.
 const NARROWEST: f32 = 0.03;
 
+/// The scene's own walk, as it is played: so many cameras in so many seconds.
+const TOUR_CAMERAS: usize = 120;
+const TOUR_SECONDS: f64 = 24.0;
+
 /// A solution as triangles, with the light that follows the eye.
 #[derive(Debug)]
-pub struct Walkthrough<'a> {
-    solved: &'a Solved,
+pub struct Walkthrough {
+    solved: Arc<Solved>,
     mode: Mode,
     mesh: DisplayMesh,
     /// Per entry of the mesh's `glossy`.
     sources: Vec<Source>,
+    /// The leaves around each of them with their shares, each leaf once: those of entry i are at `first[i]..first[i + 1]`.
+    leaves: Vec<(u32, f32)>,
+    first: Vec<u32>,
 }
 
-impl<'a> Walkthrough<'a> {
+impl Walkthrough {
     /// Makes the triangles. With [`Mode::Samples`] glossy light is that of the illumination samples, reflected at each
     /// vertex; perfect mirrors, which samples cannot show, keep their distributions.
     #[must_use]
-    pub fn new(solved: &'a Solved, mode: Mode) -> Self {
+    pub fn new(solved: Arc<Solved>, mode: Mode) -> Self {
         let (mesh, sources) = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
-        Self { solved, mode, mesh, sources }
+        let (mut leaves, mut first) = (Vec::new(), vec![0]);
+        let mut around = Vec::new();
+        for source in &sources {
+            around.clear();
+            around.extend(glossy::shares(&solved.solution, &source.corners));
+            around.sort_unstable_by_key(|&(leaf, _)| leaf);
+            let start = leaves.len();
+            for &(leaf, share) in &around {
+                match leaves[start..].last_mut() {
+                    Some((last, sum)) if *last == leaf => *sum += share,
+                    _ => leaves.push((leaf, share)),
+                }
+            }
+            first.push(leaves.len() as u32);
+        }
+        Self { solved, mode, mesh, sources, leaves, first }
     }
 
     /// Glossy radiance of a vertex toward an eye in unit space.
@@ -53,11 +77,12 @@ impl<'a> Walkthrough<'a> {
                 return glossy::reflected(solution, reflector.as_ref(), leaf, &place, away, NARROWEST, scratch);
             }
         }
-        glossy::interpolated(solution, &source.corners, normal, away)
+        let leaves = &self.leaves[self.first[slot] as usize..self.first[slot + 1] as usize];
+        glossy::blended(solution, leaves.iter().copied(), normal, away)
     }
 }
 
-impl Walkable for Walkthrough<'_> {
+impl Walkable for Walkthrough {
     fn name(&self) -> &str {
         &self.solved.scene.name
     }
@@ -68,6 +93,14 @@ impl Walkable for Walkthrough<'_> {
 
     fn cameras(&self) -> &[(String, Camera)] {
         &self.solved.scene.cameras
+    }
+
+    fn tour(&self) -> CameraPath {
+        CameraPath::through(&self.solved.scene.walkthrough(TOUR_CAMERAS), TOUR_SECONDS)
+    }
+
+    fn inside(&self) -> Option<Box<dyn Inside + '_>> {
+        Some(Box::new(Anatomy { solved: &self.solved, origin: self.mesh.origin }))
     }
 
     fn glossy_radiance(&self, eye: DVec3, vertices: &[u32], out: &mut [Rgb]) {

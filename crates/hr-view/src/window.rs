@@ -4,38 +4,83 @@
 //! happen per pixel.
 
 mod app;
+mod canvas;
+mod chunks;
+mod gauge;
 mod gpu;
 mod hud;
+mod input;
 pub(crate) mod lists;
+mod live;
+mod looking;
+mod offscreen;
+mod overlay;
+mod pipelines;
 mod refresh;
 mod scene_buffers;
+mod screen;
+mod shown;
 mod snapshot;
 mod textures;
 pub(crate) mod tone;
+mod tour;
 mod view;
 mod walker;
 
+pub use offscreen::{FrameCost, Offscreen};
+pub use screen::{Screen, Status, Wish};
 pub use snapshot::Snapshot;
 pub use tone::{Curve, Tone};
 
-use crate::display::{MeshError, Walkable};
+use crate::camera_path::CameraPath;
+use crate::display::{DisplayMesh, MeshError, Walkable};
+use glam::DVec3;
+use glossy_ext::Rgb;
+use hr_scene::Camera;
+use screen::News;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
 use winit::event_loop::EventLoop;
 
 /// How the window opens.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct WindowOptions {
+    /// What the title says before there is a solution.
+    pub name: String,
     /// Size of the picture in logical pixels (those of a screen without scaling).
     pub size: [u32; 2],
     /// Change of direction in radians that a glossy vertex is evaluated again for; 0 is any change.
     pub tolerance: f32,
+    /// A walk to play; where it is empty, that of the solution is played.
+    pub path: CameraPath,
+    /// The file that walks are recorded to; by default they go to numbered files of the current folder.
+    pub path_file: Option<PathBuf>,
+    /// Who hears what is wanted of the solution; by default nobody.
+    pub wishes: Option<Sender<Wish>>,
 }
 
 impl Default for WindowOptions {
     fn default() -> Self {
-        Self { size: [1280, 800], tolerance: 0.0 }
+        Self {
+            name: String::new(),
+            size: [1280, 800],
+            tolerance: 0.0,
+            path: CameraPath::default(),
+            path_file: None,
+            wishes: None,
+        }
     }
+}
+
+/// What was done until the window was closed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Walked {
+    /// Frames drawn.
+    pub frames: u64,
+    /// Glossy vertices evaluated.
+    pub evaluated: u64,
 }
 
 /// Why there is no window, or no window any more.
@@ -72,27 +117,79 @@ pub enum WindowError {
     },
 }
 
-/// Opens a window and walks until it is closed. Call it on the main thread, once per process: window systems want it
-/// so.
+/// Opens a window on a solution and walks until it is closed. Call it on the main thread, once per process: window
+/// systems want it so.
 ///
 /// # Errors
 /// [`WindowError::NoDisplay`] or [`WindowError::NoAdapter`], at once and before anything is shown, where there is no
 /// screen or no graphics device; the others as they happen.
-pub fn open(walk: &dyn Walkable, options: &WindowOptions) -> Result<(), WindowError> {
+pub fn open(walk: Arc<dyn Walkable>, options: &WindowOptions) -> Result<Walked, WindowError> {
     walk.mesh().check()?;
+    open_live(options, move |screen| {
+        // It has been checked.
+        drop(screen.show(walk));
+    })
+}
+
+/// Opens a window without anything in it yet. Once it is there, `start` is told the screen to show solutions on; it must
+/// return soon, having started a thread that solves. Call it on the main thread, once per process.
+///
+/// # Errors
+/// Like [`open`]; where they are errors of opening the window, `start` has not been called.
+pub fn open_live(options: &WindowOptions, start: impl FnOnce(Screen) + 'static) -> Result<Walked, WindowError> {
     let event_loop = event_loop()?;
-    let mut app = app::App::new(walk, *options);
+    let screen = Screen::new(event_loop.create_proxy());
+    let mut app = app::App::new(options.clone(), Box::new(start), screen);
     let ended = event_loop.run_app(&mut app);
-    app.finish()?;
-    ended.map_err(|error| WindowError::NoDisplay(reason(&error)))
+    let walked = app.finish()?;
+    ended.map_err(|error| WindowError::NoDisplay(reason(&error)))?;
+    Ok(walked)
+}
+
+/// What is shown before there is a solution: nothing.
+#[derive(Debug)]
+struct Blank {
+    name: String,
+    mesh: DisplayMesh,
+}
+
+impl Blank {
+    fn new(name: &str) -> Self {
+        Self { name: name.to_owned(), mesh: DisplayMesh::default() }
+    }
+}
+
+impl Walkable for Blank {
+    fn name(&self) -> &str {
+        &self.name
+    }
+    fn mesh(&self) -> &DisplayMesh {
+        &self.mesh
+    }
+    fn cameras(&self) -> &[(String, Camera)] {
+        &[]
+    }
+    fn glossy_radiance(&self, _: DVec3, _: &[u32], out: &mut [Rgb]) {
+        out.fill(Rgb::ZERO);
+    }
+}
+
+/// The first numbered file of the current folder that is not there yet.
+fn unused(stem: &str, extension: &str) -> Option<PathBuf> {
+    (1..).map(|n| PathBuf::from(format!("{stem}-{n:03}.{extension}"))).find(|path| !path.exists())
+}
+
+/// A path as the user finds it.
+fn full(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
 }
 
 /// Connects to the window system.
-fn event_loop() -> Result<EventLoop<()>, WindowError> {
+fn event_loop() -> Result<EventLoop<News>, WindowError> {
     // Where a library of the window system is missing, winit panics instead of saying so.
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
-    let built = catch_unwind(AssertUnwindSafe(|| EventLoop::builder().build()));
+    let built = catch_unwind(AssertUnwindSafe(|| EventLoop::with_user_event().build()));
     std::panic::set_hook(hook);
     match built {
         Ok(Ok(event_loop)) => Ok(event_loop),

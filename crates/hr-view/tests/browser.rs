@@ -92,7 +92,7 @@ fn difference(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
 }
 
 /// Glossy light that stays as it is from one eye, for comparison.
-struct Frozen<'a>(&'a Walkthrough<'a>, DVec3);
+struct Frozen<'a>(&'a Walkthrough, DVec3);
 
 impl Walkable for Frozen<'_> {
     fn name(&self) -> &str {
@@ -156,6 +156,7 @@ fn the_page_shows_what_the_window_shows() {
     scene.cameras = vec![("first".into(), first), ("second".into(), second)];
     let watch = &mut |_: &hr_diffuse::Progress| ControlFlow::Continue(());
     let solved = Solved::new(Arc::new(scene), Settings::with_error(0.3), true, watch).expect("a sound scene");
+    let solved = Arc::new(solved);
     let folder = Folder::new();
     let path = folder.0.join("page.html");
     hr_view::html::write(&solved, &path).expect("written");
@@ -188,7 +189,7 @@ fn the_page_shows_what_the_window_shows() {
     }
     eprintln!("ready in {} s; {} frames a second at 1280 × 720", said["seconds"], said["rate"]);
 
-    let walkthrough = Walkthrough::new(&solved, Mode::Distributions);
+    let walkthrough = Walkthrough::new(Arc::clone(&solved), Mode::Distributions);
     let tone = Tone::for_mesh(walkthrough.mesh());
     for (camera, name) in [(&first, "still"), (&second, "second")] {
         let shown = folder.picture(said[name].as_str().expect("a name"));

@@ -13,12 +13,12 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-fn solved(scene: Scene, error: f32) -> Solved {
-    Solved::new(Arc::new(scene), Settings::with_error(error), true, &mut |_| ControlFlow::Continue(()))
-        .expect("a sound scene")
+fn solved(scene: Scene, error: f32) -> Arc<Solved> {
+    let watch = &mut |_: &_| ControlFlow::Continue(());
+    Arc::new(Solved::new(Arc::new(scene), Settings::with_error(error), true, watch).expect("a sound scene"))
 }
 
-fn built_in(name: &str, error: f32) -> Solved {
+fn built_in(name: &str, error: f32) -> Arc<Solved> {
     solved(Scene::load(name).expect("built in"), error)
 }
 
@@ -48,7 +48,7 @@ fn place(mesh: &DisplayMesh, vertex: u32) -> [u32; 3] {
 fn meshes_are_sound_and_face_outward() {
     for name in ["cornell", "three-lights", "furnace"] {
         let solved = built_in(name, 0.5);
-        let walkthrough = Walkthrough::new(&solved, Mode::Distributions);
+        let walkthrough = Walkthrough::new(Arc::clone(&solved), Mode::Distributions);
         let mesh = walkthrough.mesh();
         assert_eq!(mesh.check(), Ok(()), "{name}");
         assert!(mesh.triangle_count() > 10, "{name} has {} triangles", mesh.triangle_count());
@@ -86,7 +86,7 @@ fn curved_surfaces_are_round_and_closed() {
             scene.materials[0].reflector = Arc::new(glossy_ext::Lambert::new(Rgb::ZERO).expect("black"));
         }
         let solved = solved(scene, 1.0);
-        let walkthrough = Walkthrough::new(&solved, Mode::Distributions);
+        let walkthrough = Walkthrough::new(Arc::clone(&solved), Mode::Distributions);
         let mesh = walkthrough.mesh();
         assert_eq!(mesh.check(), Ok(()), "{shape:?}");
         let mut edges: HashMap<([u32; 3], [u32; 3]), u32> = HashMap::new();
@@ -129,7 +129,7 @@ fn backs_that_absorb_are_black_and_opaque() {
         // It shines itself, and another one below lights its back: sides that no light reaches are black, too.
         let below = Shape::Quad([DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y].map(|p| p - DVec3::Z));
         let solved = solved(scene_of(vec![surface, Surface::new(below, 0)], two_sided), 1.0);
-        let walkthrough = Walkthrough::new(&solved, Mode::Distributions);
+        let walkthrough = Walkthrough::new(Arc::clone(&solved), Mode::Distributions);
         let mesh = walkthrough.mesh();
         assert_eq!(mesh.check(), Ok(()), "two-sided {two_sided}, flip {flip}");
         let (mut front, mut back) = (0.0, 0.0);
@@ -157,7 +157,7 @@ fn backs_that_absorb_are_black_and_opaque() {
 fn glossy_vertices_agree_with_the_ray_caster() {
     let solved = built_in("three-lights", 0.5);
     let scene = &solved.scene;
-    let walkthrough = Walkthrough::new(&solved, Mode::Distributions);
+    let walkthrough = Walkthrough::new(Arc::clone(&solved), Mode::Distributions);
     let mesh = walkthrough.mesh();
     assert!(!mesh.glossy.is_empty(), "the scene is glossy");
     let camera = scene.default_camera();
@@ -213,7 +213,7 @@ fn curved_leaves_reflect_with_the_normals_of_their_places() {
 #[test]
 fn the_device_draws_what_the_ray_caster_sees() {
     let solved = built_in("cornell", 0.3);
-    let walkthrough = Walkthrough::new(&solved, Mode::Distributions);
+    let walkthrough = Walkthrough::new(Arc::clone(&solved), Mode::Distributions);
     let scene = &solved.scene;
     let camera = Camera { width: 120, height: 120, ..scene.default_camera() };
     let image = RayCaster::new(scene, &solved.solution, Mode::Distributions).render(&camera, &|_| ());

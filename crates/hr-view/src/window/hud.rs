@@ -1,6 +1,9 @@
 //! Text and controls over the picture.
 
+use super::gauge::{DECADES, Gauge, Quantity, color};
 use super::gpu::Gpu;
+use super::input::HELP;
+use super::screen::Status;
 use egui::{Align2, Color32, Frame, Margin, RichText};
 use std::time::{Duration, Instant};
 use winit::event::WindowEvent;
@@ -9,23 +12,11 @@ use winit::window::Window;
 /// How long a message stays.
 const MESSAGE: Duration = Duration::from_secs(4);
 
-/// Keys and what they do, as the help shows them.
-const KEYS: [(&str, &str); 12] = [
-    ("W A S D, arrows up, down", "walk"),
-    ("E Q, space shift", "up, down"),
-    ("drag, arrows left, right", "look around"),
-    ("right click, C", "capture or free the mouse"),
-    ("wheel", "walking speed"),
-    ("1 … 9, 0", "the scene's cameras"),
-    ("+ −", "brighter, darker"),
-    ("backspace", "automatic exposure"),
-    ("F", "save a screenshot"),
-    ("T", "show or hide the line at the top"),
-    ("H", "this help"),
-    ("Esc", "quit"),
-];
+/// Size of the scale of false colours in points, and of how many bars it is made.
+const LEGEND: egui::Vec2 = egui::vec2(300.0, 14.0);
+const LEGEND_STEPS: u16 = 100;
 
-/// What the line at the top tells.
+/// What the lines at the top tell.
 pub(super) struct Facts<'a> {
     pub(super) scene: &'a str,
     /// Name of the camera that was chosen last.
@@ -39,6 +30,10 @@ pub(super) struct Facts<'a> {
     /// Time from frame to frame while something moves; before that, the time of the first frame.
     pub(super) frame: Duration,
     pub(super) device: &'a str,
+    pub(super) status: &'a Status,
+    /// Figures of the point that was picked.
+    pub(super) inside: &'a [String],
+    pub(super) gauge: Gauge,
 }
 
 /// What the help's controls change.
@@ -57,7 +52,7 @@ pub(super) struct Hud {
     context: egui::Context,
     state: egui_winit::State,
     renderer: egui_wgpu::Renderer,
-    pub(super) show_line: bool,
+    pub(super) show_lines: bool,
     pub(super) show_help: bool,
     message: Option<(String, Instant)>,
 }
@@ -79,7 +74,7 @@ impl Hud {
         let scale = Some(window.scale_factor() as f32);
         let state = egui_winit::State::new(context.clone(), egui::ViewportId::ROOT, window, scale, None, Some(largest));
         let renderer = egui_wgpu::Renderer::new(&gpu.device, format, egui_wgpu::RendererOptions::default());
-        Self { context, state, renderer, show_line: true, show_help: false, message: None }
+        Self { context, state, renderer, show_lines: true, show_help: false, message: None }
     }
 
     /// Lets egui see an event; whether it takes it for itself, and whether it looks different after it.
@@ -99,12 +94,18 @@ impl Hud {
         let now = Instant::now();
         self.message = self.message.take().filter(|(_, until)| *until > now);
         let input = self.state.take_egui_input(window);
-        let (show_line, message) = (self.show_line, self.message.as_ref().map(|(text, _)| text.as_str()));
+        let (show_lines, message) = (self.show_lines, self.message.as_ref().map(|(text, _)| text.as_str()));
         let mut show_help = self.show_help;
         let output = self.context.run_ui(input, |ui| {
             let context = ui.ctx().clone();
-            if show_line {
-                line(&context, facts, settings);
+            if show_lines {
+                lines(&context, facts, settings);
+            }
+            if !facts.inside.is_empty() {
+                label(&context, "inside", Align2::RIGHT_TOP, [-8.0, 8.0], &facts.inside.join("\n"));
+            }
+            if facts.gauge.quantity != Quantity::Picture {
+                legend(&context, facts.gauge);
             }
             if let Some(text) = message {
                 label(&context, "message", Align2::CENTER_BOTTOM, [0.0, -16.0], text);
@@ -176,28 +177,85 @@ fn label(context: &egui::Context, id: &str, anchor: Align2, offset: [f32; 2], te
     });
 }
 
-fn line(context: &egui::Context, facts: &Facts<'_>, settings: &Settings) {
+fn lines(context: &egui::Context, facts: &Facts<'_>, settings: &Settings) {
     let milliseconds = facts.frame.as_secs_f64() * 1e3;
     let rate = if milliseconds > 0.0 { 1e3 / milliseconds } else { 0.0 };
     let camera = facts.camera.map(|name| format!(" · {name}")).unwrap_or_default();
     let text = format!(
         "{}{camera}   {milliseconds:.1} ms  {rate:.0} fps   {} triangles   glossy {} of {} vertices in {:.1} ms   \
-         {:+.1} EV   H help",
+         {:+.1} EV   H help\n{}",
         facts.scene,
         facts.triangles,
         facts.evaluated,
         facts.glossy,
         facts.evaluation.as_secs_f64() * 1e3,
         settings.stops,
+        solving(facts.status),
     );
-    label(context, "line", Align2::LEFT_TOP, [8.0, 8.0], &text);
+    label(context, "lines", Align2::LEFT_TOP, [8.0, 8.0], text.trim_end());
+}
+
+/// How far the solution is, and how good the one that is shown.
+fn solving(status: &Status) -> String {
+    let percent = |share: f32| 100.0 * share;
+    let shown = status.shown.map(|error| format!("shown: error about {:.1} %", percent(error)));
+    let Some(activity) = &status.activity else { return shown.unwrap_or_default() };
+    let paused = if status.paused { "paused, P goes on   " } else { "" };
+    let shown = shown.map(|shown| format!("   {shown}")).unwrap_or_default();
+    let asked = format!("error of {:.1} % asked for", percent(status.asked));
+    format!("{paused}{activity}   {:.0} %   {asked}{shown}", percent(status.fraction))
+}
+
+/// The scale of false colours.
+fn legend(context: &egui::Context, gauge: Gauge) {
+    egui::Area::new(egui::Id::unique("legend")).anchor(Align2::LEFT_BOTTOM, [8.0, -8.0]).interactable(false).show(
+        context,
+        |ui| {
+            backdrop().show(ui, |ui| {
+                let text = |ui: &mut egui::Ui, text: String| ui.label(RichText::new(text).color(Color32::WHITE));
+                text(ui, gauge.quantity.label().to_owned());
+                let (place, _) = ui.allocate_exact_size(LEGEND, egui::Sense::hover());
+                let width = place.width() / f32::from(LEGEND_STEPS);
+                for step in 0..LEGEND_STEPS {
+                    let left = place.left() + width * f32::from(step);
+                    let size = egui::vec2(width + 0.5, place.height());
+                    let bar = egui::Rect::from_min_size(egui::pos2(left, place.top()), size);
+                    let share = (f32::from(step) + 0.5) / f32::from(LEGEND_STEPS);
+                    let [r, g, b] = color(share);
+                    ui.painter().rect_filled(bar, 0.0, egui::Rgba::from_rgb(r, g, b));
+                }
+                ui.horizontal(|ui| {
+                    ui.set_width(place.width());
+                    ui.columns(4, |columns| {
+                        for (i, column) in (0_u8..).zip(columns) {
+                            let value = gauge.high * 10_f32.powf(f32::from(i) - DECADES);
+                            text(column, short(value));
+                        }
+                    });
+                });
+            });
+        },
+    );
+}
+
+/// A number on a scale, short.
+fn short(value: f32) -> String {
+    if (1e-3..1e5).contains(&value) {
+        let digits = (2.0 - value.log10().floor()).clamp(0.0, 6.0);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0…6")]
+        let text = format!("{value:.*}", digits as usize);
+        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        text.to_owned()
+    } else {
+        format!("{value:.1e}")
+    }
 }
 
 fn help(context: &egui::Context, facts: &Facts<'_>, settings: &mut Settings, open: &mut bool) {
     let window = egui::Window::new("Help").open(open).collapsible(false).resizable(false);
     window.anchor(Align2::CENTER_CENTER, [0.0, 0.0]).show(context, |ui| {
         egui::Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).show(ui, |ui| {
-            for (keys, action) in KEYS {
+            for (keys, action) in HELP {
                 ui.label(RichText::new(keys).strong());
                 ui.label(action);
                 ui.end_row();
@@ -220,4 +278,18 @@ fn help(context: &egui::Context, facts: &Facts<'_>, settings: &mut Settings, ope
         ui.separator();
         ui.label(RichText::new(format!("{} vertices · {}", facts.vertices, facts.device)).weak());
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        let cases =
+            [(5000.0, "5000"), (0.05, "0.05"), (1.5, "1.5"), (2e7, "2.0e7"), (1e-5, "1.0e-5"), (0.0123, "0.0123")];
+        for (value, text) in cases {
+            assert_eq!(short(value), text, "{value}");
+        }
+    }
 }

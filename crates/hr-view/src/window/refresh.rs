@@ -3,6 +3,7 @@
 //! A vertex is evaluated when a triangle that it belongs to may be seen and the direction toward the eye has changed
 //! by more than a tolerance since the last time (paper, section 5).
 
+use super::chunks::Chunked;
 use super::lists::VertexList;
 use super::tone::finite;
 use crate::display::Walkable;
@@ -46,6 +47,11 @@ pub(super) struct Refresh {
     needed_in: Vec<u32>,
     /// Number of the current refresh.
     now: u32,
+    /// List vertices to be evaluated, their positions in `DisplayMesh::glossy`, and what they become; kept for their
+    /// memory.
+    stale: Vec<usize>,
+    slots_of_stale: Vec<u32>,
+    fresh: Vec<Rgb>,
 }
 
 impl Refresh {
@@ -64,6 +70,9 @@ impl Refresh {
             radiance: vec![Rgb::ZERO; count],
             needed_in: vec![0; count],
             now: 0,
+            stale: Vec::new(),
+            slots_of_stale: Vec::new(),
+            fresh: Vec::new(),
         }
     }
 
@@ -76,7 +85,7 @@ impl Refresh {
     pub(super) fn update(
         &mut self,
         walk: &dyn Walkable,
-        list: &VertexList,
+        chunked: &Chunked,
         eye: DVec3,
         sight: &Sight,
         tolerance: f32,
@@ -85,42 +94,47 @@ impl Refresh {
         // Two unit vectors at an angle t are 2 sin(t/2) apart: exact for small angles, where a cosine is all rounding.
         let apart = 2.0 * (0.5 * tolerance.clamp(0.0, std::f32::consts::PI)).sin();
         let mut done = Refreshed::default();
-        let mut stale = Vec::new();
-        for corners in list.indices.chunks_exact(3) {
-            let corners = [corners[0], corners[1], corners[2]].map(|c| c as usize);
-            if !may_be_seen(corners.map(|c| self.positions[c]), sight) {
-                continue;
-            }
-            for c in corners {
-                if self.needed_in[c] == self.now || self.slots[c].is_none() {
+        self.stale.clear();
+        self.slots_of_stale.clear();
+        for chunk in chunked.chunks.iter().filter(|chunk| chunk.may_be_seen(sight)) {
+            let indices = &chunked.list.indices[chunk.indices.start as usize..chunk.indices.end as usize];
+            for corners in indices.chunks_exact(3) {
+                let corners = [corners[0], corners[1], corners[2]].map(|c| c as usize);
+                if corners.iter().all(|&c| self.needed_in[c] == self.now || self.slots[c].is_none())
+                    || !may_be_seen(corners.map(|c| self.positions[c]), sight)
+                {
                     continue;
                 }
-                self.needed_in[c] = self.now;
-                done.visible += 1;
-                let toward = (sight.eye - self.positions[c]).normalize_or_zero();
-                let moved = (toward - self.seen_from[c]).length_squared() > apart * apart;
-                if moved || self.seen_from[c] == Vec3::ZERO {
-                    self.seen_from[c] = toward;
-                    stale.push(c);
+                for c in corners {
+                    let Some(slot) = self.slots[c].filter(|_| self.needed_in[c] != self.now) else { continue };
+                    self.needed_in[c] = self.now;
+                    done.visible += 1;
+                    let toward = (sight.eye - self.positions[c]).normalize_or_zero();
+                    let moved = (toward - self.seen_from[c]).length_squared() > apart * apart;
+                    if moved || self.seen_from[c] == Vec3::ZERO {
+                        self.seen_from[c] = toward;
+                        self.stale.push(c);
+                        self.slots_of_stale.push(slot);
+                    }
                 }
             }
         }
-        done.evaluated = stale.len();
-        let slots: Vec<u32> = stale.iter().filter_map(|&c| self.slots[c]).collect();
-        let mut fresh = vec![Rgb::ZERO; slots.len()];
-        slots
+        done.evaluated = self.stale.len();
+        self.fresh.clear();
+        self.fresh.resize(self.stale.len(), Rgb::ZERO);
+        self.slots_of_stale
             .par_chunks(CHUNK)
-            .zip(fresh.par_chunks_mut(CHUNK))
+            .zip(self.fresh.par_chunks_mut(CHUNK))
             .for_each(|(slots, out)| walk.glossy_radiance(eye, slots, out));
-        for (c, value) in stale.into_iter().zip(fresh) {
-            self.radiance[c] = finite(value);
+        for (&c, value) in self.stale.iter().zip(&self.fresh) {
+            self.radiance[c] = finite(*value);
         }
         done
     }
 }
 
 /// Whether a triangle faces the eye and is not wholly on the far side of one of the picture's edges.
-fn may_be_seen([a, b, c]: [Vec3; 3], sight: &Sight) -> bool {
+pub(super) fn may_be_seen([a, b, c]: [Vec3; 3], sight: &Sight) -> bool {
     let normal = (b - a).cross(c - a);
     normal.dot(sight.eye - a) > 0.0
         && sight.sides.iter().all(|side| [a, b, c].iter().any(|p| side.dot(p - sight.eye) >= 0.0))
@@ -130,7 +144,7 @@ fn may_be_seen([a, b, c]: [Vec3; 3], sight: &Sight) -> bool {
 mod tests {
     use super::*;
     use crate::display::{Batch, DisplayMesh};
-    use crate::window::lists::split;
+    use crate::window::chunks::chunked;
     use crate::window::view::View;
     use glam::Vec2;
     use hr_scene::Camera;
@@ -178,7 +192,7 @@ mod tests {
     }
 
     fn update(refresh: &mut Refresh, square: &Square, eye: DVec3, target: DVec3, tolerance: f32) -> Refreshed {
-        let [_, list] = split(square.mesh());
+        let [_, list] = chunked(square.mesh());
         let view = View::looking(eye, target - eye, DVec3::Y, 90.0, 1.0);
         refresh.update(square, &list, eye, &view.sight(DVec3::ZERO, 1.0), tolerance)
     }
@@ -186,8 +200,8 @@ mod tests {
     #[test]
     fn only_what_changed_is_evaluated() {
         let square = Square::new();
-        let [_, list] = split(square.mesh());
-        let mut refresh = Refresh::new(&square, &list);
+        let [_, list] = chunked(square.mesh());
+        let mut refresh = Refresh::new(&square, &list.list);
         let eye = DVec3::new(0.0, 0.0, 4.0);
         let all = Refreshed { visible: 4, evaluated: 4 };
         assert_eq!(update(&mut refresh, &square, eye, DVec3::ZERO, 0.0), all, "first sight");
@@ -206,8 +220,8 @@ mod tests {
     #[test]
     fn what_is_not_seen_waits() {
         let square = Square::new();
-        let [_, list] = split(square.mesh());
-        let mut refresh = Refresh::new(&square, &list);
+        let [_, list] = chunked(square.mesh());
+        let mut refresh = Refresh::new(&square, &list.list);
         let above = DVec3::new(0.0, 0.0, 4.0);
         let away = update(&mut refresh, &square, above, DVec3::new(0.0, 0.0, 9.0), 0.0);
         assert_eq!(away, Refreshed::default(), "it is behind the eye");

@@ -1,5 +1,8 @@
 // Radiance at the vertices, interpolated, and tone mapped at the pixel.
 
+const RAMP = 7u; // colours of the false-colour ramp, as in gauge.rs
+const PI = 3.14159265;
+
 struct Frame {
     eye: vec4f,         // relative to the mesh's origin
     right: vec4f,       // unit; w: horizontal scale, cotangent of half the field of view
@@ -8,6 +11,9 @@ struct Frame {
     to_srgb: mat3x3f,   // from the scene's primaries to linear sRGB
     numerator: vec4f,   // a, b of the curve; exposure; largest exposed value
     denominator: vec4f, // c, d, e of the curve; 1 where the target does not encode sRGB by itself
+    luminance: vec4f,   // weights; w: the quantity in false colours: 0 none, 1 radiance, 2 radiosity, 3 irradiance
+    scale: vec4f,       // binary logarithm of the low end, 1 / that of high / low
+    ramp: array<vec4f, RAMP>,
 }
 
 struct Placement {
@@ -15,12 +21,18 @@ struct Placement {
     v: vec4f,
 }
 
-struct Fragment {
+// Between the vertices of a triangle without a texture only the sum is interpolated: where the processor draws, every
+// number that is costs as much as the tone mapping.
+struct Plain {
     @builtin(position) position: vec4f,
-    @location(0) irradiance: vec3f,
-    @location(1) tint: vec3f,
-    @location(2) radiance: vec3f,
-    @location(3) uv: vec2f,
+    @location(0) value: vec3f,
+}
+
+struct Textured {
+    @builtin(position) position: vec4f,
+    @location(0) diffuse: vec3f,    // what the texture multiplies
+    @location(1) other: vec3f,
+    @location(2) uv: vec2f,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -44,14 +56,52 @@ struct Vertex {
     @location(4) uv: vec2f,
 }
 
-@vertex
-fn diffuse_vertex(v: Vertex) -> Fragment {
-    return Fragment(project(v.point), v.irradiance, v.tint, v.emission, v.uv);
+// What the texture multiplies, and the rest: radiance, or what is shown in false colours instead.
+struct Light {
+    diffuse: vec3f,
+    other: vec3f,
+}
+
+fn light(v: Vertex, glossy: vec3f) -> Light {
+    let quantity = frame.luminance.w;
+    if quantity > 2.5 {
+        return Light(v.irradiance, vec3f(0.0));
+    }
+    let diffuse = v.irradiance * v.tint;
+    if quantity > 1.5 {
+        return Light(PI * diffuse, PI * v.emission);
+    }
+    return Light(diffuse, v.emission + glossy);
+}
+
+fn plain(v: Vertex, glossy: vec3f) -> Plain {
+    let l = light(v, glossy);
+    return Plain(project(v.point), l.diffuse + l.other);
+}
+
+fn textured(v: Vertex, glossy: vec3f) -> Textured {
+    let l = light(v, glossy);
+    return Textured(project(v.point), l.diffuse, l.other, v.uv);
 }
 
 @vertex
-fn glossy_vertex(v: Vertex, @location(5) glossy: vec3f) -> Fragment {
-    return Fragment(project(v.point), v.irradiance, v.tint, v.emission + glossy, v.uv);
+fn diffuse_plain(v: Vertex) -> Plain {
+    return plain(v, vec3f(0.0));
+}
+
+@vertex
+fn diffuse_textured(v: Vertex) -> Textured {
+    return textured(v, vec3f(0.0));
+}
+
+@vertex
+fn glossy_plain(v: Vertex, @location(5) glossy: vec3f) -> Plain {
+    return plain(v, glossy);
+}
+
+@vertex
+fn glossy_textured(v: Vertex, @location(5) glossy: vec3f) -> Textured {
+    return textured(v, glossy);
 }
 
 fn curve(x: vec3f) -> vec3f {
@@ -60,16 +110,44 @@ fn curve(x: vec3f) -> vec3f {
     return clamp((x * (n.x * x + n.y)) / (x * (d.x * x + d.y) + d.z), vec3f(0.0), vec3f(1.0));
 }
 
+// 1.055 x^(1/2.4) − 0.055 above its linear part, to a tenth of a code of 255: two square roots, as a power costs several
+// times as much where the processor draws.
 fn srgb_encode(x: vec3f) -> vec3f {
-    return select(1.055 * pow(x, vec3f(1.0 / 2.4)) - 0.055, 12.92 * x, x <= vec3f(0.0031308));
+    let root = sqrt(x);
+    let power = 0.83372968 * root + 0.29813416 * sqrt(root) - 0.0553148 * x - 0.07691036;
+    return select(power, 12.92 * x, x <= vec3f(0.0031308));
+}
+
+// The colour of a value on the logarithmic scale.
+fn graded(value: vec3f) -> vec3f {
+    let y = dot(max(value, vec3f(0.0)), frame.luminance.xyz);
+    let place = clamp((log2(max(y, 1e-37)) - frame.scale.x) * frame.scale.y, 0.0, 1.0) * f32(RAMP - 1u);
+    let below = min(u32(place), RAMP - 2u);
+    return mix(frame.ramp[below].rgb, frame.ramp[below + 1u].rgb, place - f32(below));
+}
+
+// What a screen shows, of linear sRGB 0…1.
+fn encoded(linear: vec3f) -> vec4f {
+    return vec4f(select(linear, srgb_encode(linear), frame.denominator.w > 0.5), 1.0);
+}
+
+fn shown(value: vec3f) -> vec4f {
+    if frame.luminance.w > 0.5 {
+        return encoded(graded(value));
+    }
+    let exposed = clamp(value * frame.numerator.z, vec3f(0.0), vec3f(frame.numerator.w));
+    return encoded(curve(max(frame.to_srgb * exposed, vec3f(0.0))));
 }
 
 @fragment
-fn fragment(in: Fragment) -> @location(0) vec4f {
+fn plain_fragment(in: Plain) -> @location(0) vec4f {
+    return shown(in.value);
+}
+
+@fragment
+fn textured_fragment(in: Textured) -> @location(0) vec4f {
     let place = vec3f(in.uv, 1.0);
     let texel = textureSample(texels, texel_sampler, vec2f(dot(placement.u.xyz, place), dot(placement.v.xyz, place)));
-    let radiance = in.irradiance * in.tint * texel.rgb + in.radiance;
-    let exposed = clamp(radiance * frame.numerator.z, vec3f(0.0), vec3f(frame.numerator.w));
-    let shown = curve(max(frame.to_srgb * exposed, vec3f(0.0)));
-    return vec4f(select(shown, srgb_encode(shown), frame.denominator.w > 0.5), 1.0);
+    // Irradiance is that of what is under the texture.
+    return shown(in.diffuse * select(texel.rgb, vec3f(1.0), frame.luminance.w > 2.5) + in.other);
 }

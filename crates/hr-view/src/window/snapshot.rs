@@ -1,10 +1,12 @@
 //! Pictures without a screen: screenshots, and frames drawn by the device without a window.
 
 use super::WindowError;
+use super::chunks::chunked;
+use super::gauge::Gauge;
 use super::gpu::{Gpu, one_line};
-use super::lists::split;
-use super::refresh::Refresh;
-use super::scene_buffers::{Frame, Pass, SceneBuffers};
+use super::pipelines::{Layouts, Pass};
+use super::scene_buffers::{Frame, SceneBuffers};
+use super::shown::Shown;
 use super::tone::Tone;
 use super::view::View;
 use crate::display::Walkable;
@@ -13,6 +15,27 @@ use hr_scene::{Camera, SceneError};
 use image::ImageEncoder;
 use std::io;
 use std::path::Path;
+
+/// Format of pictures in memory.
+pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// A texture to draw a picture on and to read it back from.
+pub(super) fn target(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<wgpu::Texture, WindowError> {
+    let limit = gpu.device.limits().max_texture_dimension_2d;
+    if width > limit || height > limit {
+        return Err(WindowError::TooLarge { size: width.max(height).into(), limit: limit.into() });
+    }
+    Ok(gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("snapshot"),
+        size: wgpu::Extent3d { width: width.max(1), height: height.max(1), depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: FORMAT,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    }))
+}
 
 /// An 8-bit sRGB picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,42 +58,26 @@ impl Snapshot {
         let mesh = walk.mesh();
         mesh.check()?;
         let gpu = Gpu::new()?;
-        let lists = split(mesh);
-        let scene = SceneBuffers::new(&gpu, mesh, &lists)?;
+        let layouts = Layouts::new(&gpu);
         let size = [camera.width.max(1), camera.height.max(1)];
         let view = View::of_camera(camera);
-        let mut refresh = Refresh::new(walk, &lists[1]);
-        let sight = view.sight(mesh.origin, f64::from(size[0]) / f64::from(size[1]));
-        refresh.update(walk, &lists[1], view.eye, &sight, 0.0);
-        scene.set_glossy(&gpu, refresh.radiance());
+        let mut shown = Shown::new(&gpu, &layouts, walk, chunked(mesh))?;
+        shown.follow(&gpu, walk, &view, size, 0.0);
         let automatic = Tone::for_mesh(mesh);
-        let frame = Frame { view: &view, tone: tone.unwrap_or(&automatic), mesh };
-        Self::draw(&gpu, &scene, size, &frame)
+        let frame = Frame { view: &view, tone: tone.unwrap_or(&automatic), mesh, gauge: Gauge::OFF, marks: &[] };
+        Self::draw(&gpu, &layouts, &shown.buffers, size, &frame)
     }
 
     /// Draws one frame into memory.
     pub(super) fn draw(
         gpu: &Gpu,
+        layouts: &Layouts,
         scene: &SceneBuffers,
         [width, height]: [u32; 2],
         frame: &Frame<'_>,
     ) -> Result<Self, WindowError> {
-        let limit = gpu.device.limits().max_texture_dimension_2d;
-        if width > limit || height > limit {
-            return Err(WindowError::TooLarge { size: width.max(height).into(), limit: limit.into() });
-        }
-        let format = wgpu::TextureFormat::Rgba8Unorm;
-        let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
-        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("snapshot"),
-            size,
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+        let texture = target(gpu, [width, height])?;
+        let size = texture.size();
         let row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("snapshot"),
@@ -80,7 +87,7 @@ impl Snapshot {
         });
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Pass::new(gpu, scene, format, gpu.samples(format)).draw(
+        Pass::new(gpu, layouts, FORMAT, gpu.samples(FORMAT)).draw(
             gpu,
             scene,
             &mut encoder,
@@ -131,5 +138,48 @@ impl Snapshot {
             };
             WindowError::Save { path: path.to_path_buf(), reason }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::window::Blank;
+
+    fn drawn(prepare: impl Fn(&Gpu), size: [u32; 2]) -> Option<Result<Snapshot, WindowError>> {
+        let gpu = match Gpu::new() {
+            Ok(gpu) => gpu,
+            Err(error) => {
+                eprintln!("skipped, no graphics device: {error}");
+                return None;
+            }
+        };
+        let (layouts, nothing) = (Layouts::new(&gpu), Blank::new("nothing"));
+        let mut shown = Shown::new(&gpu, &layouts, &nothing, chunked(nothing.mesh())).expect("nothing is not too much");
+        let view = View::looking(glam::DVec3::ZERO, glam::DVec3::X, glam::DVec3::Z, 60.0, 1.0);
+        prepare(&gpu);
+        shown.follow(&gpu, &nothing, &view, size, 0.0);
+        let tone = Tone::for_mesh(nothing.mesh());
+        let frame = Frame { view: &view, tone: &tone, mesh: nothing.mesh(), gauge: Gauge::OFF, marks: &[] };
+        Some(Snapshot::draw(&gpu, &layouts, &shown.buffers, size, &frame))
+    }
+
+    #[test]
+    fn nothing_is_black() {
+        let Some(picture) = drawn(|_| (), [3, 2]) else { return };
+        let picture = picture.expect("a picture of nothing");
+        assert!(picture.rgba.chunks(4).all(|p| p == [0, 0, 0, 255]), "black: {:?}", picture.rgba);
+    }
+
+    #[test]
+    fn a_device_that_is_lost_is_an_error() {
+        let Some(picture) = drawn(|gpu| gpu.device.destroy(), [3, 2]) else { return };
+        assert!(matches!(picture, Err(WindowError::Device(_))), "{picture:?}");
+    }
+
+    #[test]
+    fn pictures_beyond_the_device_are_refused() {
+        let Some(picture) = drawn(|_| (), [1 << 30, 1]) else { return };
+        assert!(matches!(picture, Err(WindowError::TooLarge { .. })), "{picture:?}");
     }
 }

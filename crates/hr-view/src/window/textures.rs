@@ -37,12 +37,6 @@ impl<'a> Uploader<'a> {
         (self.levels(level), self.sampler(texture.wrap))
     }
 
-    /// What is drawn where there is no texture.
-    pub(super) fn white(&self) -> (wgpu::TextureView, wgpu::Sampler) {
-        let level = Level { width: 1, height: 1, data: vec![Rgb::ONE].into() };
-        (self.levels(level), self.sampler([Wrap::Clamp; 2]))
-    }
-
     fn sampler(&self, wrap: [Wrap; 2]) -> wgpu::Sampler {
         let [address_mode_u, address_mode_v] = wrap.map(|wrap| match wrap {
             Wrap::Repeat => wgpu::AddressMode::Repeat,

@@ -3,6 +3,7 @@
 use super::refresh::Sight;
 use glam::DVec3;
 use hr_scene::Camera;
+use hr_scene::camera::MAX_SIDE;
 
 /// Directions closer to the vertical than this (radians) are not looked in: the horizon would flip.
 const STEEPEST: f64 = 0.01;
@@ -44,6 +45,20 @@ impl View {
         Self::looking(eye, target - eye, camera.up.into(), camera.fov_x, shape)
     }
 
+    /// A camera whose picture of this size (pixels, ≥ 1) shows what a window of the size shows.
+    pub(super) fn camera(&self, [width, height]: [u32; 2]) -> Camera {
+        let [width, height] = [width.clamp(1, MAX_SIDE), height.clamp(1, MAX_SIDE)];
+        Camera {
+            eye: self.eye.to_array(),
+            // Far from zero a step of 1 would be lost.
+            target: (self.eye + self.forward * (1e-6 * self.eye.length()).max(1.0)).to_array(),
+            up: self.up.to_array(),
+            fov_x: self.breadth(f64::from(width) / f64::from(height)).to_degrees(),
+            width,
+            height,
+        }
+    }
+
     /// From outside at a box with these corners, the whole of it in the picture.
     pub(super) fn around(low: DVec3, high: DVec3, up: DVec3) -> Self {
         let aside = up.any_orthonormal_vector();
@@ -81,10 +96,17 @@ impl View {
         2.0 * self.scales(aspect)[0].recip().atan()
     }
 
+    /// Direction (any length) through a point in pixels from the upper left corner of a picture of a size.
+    pub(super) fn direction(&self, [x, y]: [f64; 2], size: [u32; 2]) -> DVec3 {
+        let [width, height] = size.map(|side| f64::from(side.max(1)));
+        let [sx, sy] = self.scales(width / height);
+        self.forward + self.right * ((2.0 * x / width - 1.0) / sx) + self.up * ((1.0 - 2.0 * y / height) / sy)
+    }
+
     /// The part of space that a picture of width / height `aspect` shows, relative to `origin`.
     pub(super) fn sight(&self, origin: DVec3, aspect: f64) -> Sight {
         let [x, y] = self.scales(aspect);
-        let side = |across: DVec3, scale: f64| (self.forward + across * scale).as_vec3();
+        let side = |across: DVec3, scale: f64| (self.forward + across * scale).normalize().as_vec3();
         Sight {
             eye: (self.eye - origin).as_vec3(),
             sides: [side(self.right, x), side(-self.right, x), side(self.up, y), side(-self.up, y)],
@@ -135,6 +157,24 @@ mod tests {
                 assert_eq!(sees(1.01, 0.5), aspect > shape, "{what}: more at the sides only in wider ones");
             }
             assert!((view.breadth(shape).to_degrees() - 50.0).abs() < 1e-9, "its own breadth in its own shape");
+        }
+    }
+
+    #[test]
+    fn cameras_show_what_the_window_shows() {
+        let eye = DVec3::new(4e6, -2e6, 1e3);
+        let view = View::looking(eye, DVec3::new(1.0, 2.0, 0.3), DVec3::Z, 70.0, 1.6);
+        for size in [[640, 400], [300, 900], [1, 1], [2000, 100]] {
+            let camera = view.camera(size);
+            assert!(camera.check("c").is_ok(), "{size:?}: {camera:?}");
+            let again = View::of_camera(&camera);
+            let aspect = f64::from(size[0]) / f64::from(size[1]);
+            assert!((again.forward - view.forward).length() < 1e-8, "{size:?}: {} {}", again.forward, view.forward);
+            let off = (again.breadth(aspect) - view.breadth(aspect)).abs();
+            assert!(off < 1e-9, "{size:?}: the breadth is off by {off}");
+            let at = [0.3, 0.8].map(|share| share * f64::from(size[0].min(size[1])));
+            let turn = view.direction(at, size).normalize() - camera.direction(at[0], at[1]);
+            assert!(turn.length() < 1e-8, "{size:?}: the same pixel looks the same way, not {turn} off");
         }
     }
 

@@ -60,17 +60,31 @@ pub(super) struct Walker {
 impl Walker {
     /// At the first camera, or where the whole scene is in view.
     pub(super) fn new(walk: &dyn Walkable) -> Self {
+        let mut walker = Self {
+            view: View::around(DVec3::ZERO, DVec3::ONE, DVec3::Z),
+            up: DVec3::Z,
+            pace: 1.0,
+            notches: 0.0,
+            held: Vec::new(),
+        };
+        walker.enter(walk, true);
+        walker
+    }
+
+    /// Goes on in another scene: from where a new walk begins, or from where it is.
+    pub(super) fn enter(&mut self, walk: &dyn Walkable, from_start: bool) {
         let mesh = walk.mesh();
-        let up = walk.up().try_normalize().unwrap_or(DVec3::Z);
+        self.up = walk.up().try_normalize().unwrap_or(DVec3::Z);
         let (low, high) = mesh.bounds();
         let (low, high) = (mesh.origin + low.as_dvec3(), mesh.origin + high.as_dvec3());
-        let view = match walk.cameras().first() {
-            Some((_, camera)) => View::of_camera(camera),
-            None => View::around(low, high, up),
-        };
         let diagonal = (high - low).length();
-        let pace = if diagonal > 0.0 { diagonal / CROSSING } else { 1.0 };
-        Self { view, up, pace, notches: 0.0, held: Vec::new() }
+        self.pace = if diagonal > 0.0 { diagonal / CROSSING } else { 1.0 };
+        if from_start {
+            self.view = match walk.cameras().first() {
+                Some((_, camera)) => View::of_camera(camera),
+                None => View::around(low, high, self.up),
+            };
+        }
     }
 
     /// Takes a key; whether it is one that moves.

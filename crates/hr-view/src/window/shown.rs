@@ -1,0 +1,67 @@
+//! A solution on the device, with its glossy light as the eye sees it.
+
+use super::WindowError;
+use super::chunks::Chunked;
+use super::gpu::Gpu;
+use super::pipelines::Layouts;
+use super::refresh::{Refresh, Refreshed};
+use super::scene_buffers::SceneBuffers;
+use super::view::View;
+use crate::display::Walkable;
+use std::time::{Duration, Instant};
+
+/// What glossy radiances are computed for: the view, the picture's size, the tolerance in radians.
+type Circumstances = (View, [u32; 2], f32);
+
+/// Buffers and what they were computed for.
+pub(super) struct Shown {
+    pub(super) buffers: SceneBuffers,
+    /// Triangles with a vertex whose radiance follows the eye.
+    glossy: Chunked,
+    refresh: Refresh,
+    computed_for: Option<Circumstances>,
+    /// What the last refresh did, and how long it took.
+    pub(super) refreshed: Refreshed,
+    pub(super) evaluation: Duration,
+}
+
+impl Shown {
+    /// Uploads a checked mesh, split into its lists.
+    pub(super) fn new(
+        gpu: &Gpu,
+        layouts: &Layouts,
+        walk: &dyn Walkable,
+        lists: [Chunked; 2],
+    ) -> Result<Self, WindowError> {
+        let buffers = SceneBuffers::new(gpu, layouts, walk.mesh(), &lists)?;
+        let [_, glossy] = lists;
+        let refresh = Refresh::new(walk, &glossy.list);
+        let (refreshed, evaluation) = (Refreshed::default(), Duration::ZERO);
+        Ok(Self { buffers, glossy, refresh, computed_for: None, refreshed, evaluation })
+    }
+
+    /// Brings glossy radiances up to date where the eye, the picture's edges or the tolerance have changed. How many were
+    /// evaluated.
+    pub(super) fn follow(
+        &mut self,
+        gpu: &Gpu,
+        walk: &dyn Walkable,
+        view: &View,
+        size: [u32; 2],
+        tolerance: f32,
+    ) -> usize {
+        let wanted = (*view, size, tolerance);
+        if self.computed_for == Some(wanted) {
+            return 0;
+        }
+        self.computed_for = Some(wanted);
+        let begin = Instant::now();
+        let sight = view.sight(walk.mesh().origin, f64::from(size[0]) / f64::from(size[1]));
+        self.refreshed = self.refresh.update(walk, &self.glossy, view.eye, &sight, tolerance);
+        if self.refreshed.evaluated > 0 {
+            self.buffers.set_glossy(gpu, self.refresh.radiance());
+        }
+        self.evaluation = begin.elapsed();
+        self.refreshed.evaluated
+    }
+}
