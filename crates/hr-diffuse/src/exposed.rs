@@ -37,6 +37,18 @@ pub(crate) fn expose(scene: &SceneData, elements: &mut Elements) {
         .map(|node| exposed_share(scene, elements, node))
         .collect();
     elements.exposed.extend(new);
+    for node in (0..elements.nodes.len()).rev() {
+        let element = &elements.nodes[node];
+        let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
+        let (mut open, mut area) = (0.0, 0.0);
+        for (child, &exposed) in elements.nodes[children.clone()].iter().zip(&elements.exposed[children]) {
+            open += child.area * exposed;
+            area += child.area;
+        }
+        if area > 0.0 {
+            elements.exposed[node] = open / area;
+        }
+    }
 }
 
 /// Whether light that meets a side goes nowhere from there: it is sealed, or the inside of something.

@@ -86,6 +86,11 @@ impl Gather {
         self.push.faint_links
     }
 
+    /// Rays shot for the leaves' weights.
+    pub(crate) fn rays(&self) -> u64 {
+        self.push.rays
+    }
+
     /// Bytes of the weights that are kept.
     pub(crate) fn weight_bytes(&self) -> u64 {
         self.push.weight_bytes()

@@ -10,8 +10,7 @@ use crate::gather::Group;
 use crate::hierarchy::{Element, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
 use crate::links::{Link, Links};
-use crate::sampling::hash;
-use crate::segments::visibility_at;
+use crate::segments::visibility;
 use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
 use glam::Vec3;
@@ -29,8 +28,10 @@ const FAR: f32 = 0.25;
 /// other by turns, which no mean visibility can tell.
 const MOST_WEIGHT: f32 = 8.0;
 
-/// Rays for a link that brings all light of a leaf; others in proportion, within limits.
+/// Rays for a link that brings all light of a leaf; others in proportion, within limits. A single one tells nothing of
+/// the directions that matter more than others.
 const RAYS: f32 = 64.0;
+const LEAST_RAYS: f32 = 2.0;
 const MOST_RAYS: f32 = 16.0;
 /// Links none of whose segments was free let so much through, of which each leaf finds out what is true.
 const LEAST_VISIBLE: f32 = 0.01;
@@ -65,6 +66,8 @@ pub(crate) struct Push {
     means: Vec<f32>,
     /// Links that would be looked at closely if they brought more.
     pub(crate) faint_links: u64,
+    /// Rays shot for the weights.
+    pub(crate) rays: u64,
     /// Where the weights of each leaf begin; as many leaves as have kept ones, and the end of the last.
     first: Vec<usize>,
     /// By leaf, then by node from the leaf up to the root, then by those links of the node that are not spread evenly.
@@ -90,6 +93,7 @@ impl Push {
             error: error.unwrap_or_default(),
             means,
             faint_links: 0,
+            rays: 0,
             first: vec![0],
             weights: Vec::new(),
         };
@@ -121,19 +125,25 @@ impl Push {
             rest = after;
         }
         let chunk = if error.is_some() { BETWEEN_WATCHES * threads::current_num_threads() } else { parts.len().max(1) };
+        let mut rays = 0;
         for part in parts.chunks_mut(chunk) {
             if error.is_some() && watch().is_break() {
                 return Self::new(light, links, None, room, watch);
             }
-            part.par_iter_mut().with_min_len(4).for_each(|(leaf, weights)| {
-                let mut slots = weights.iter_mut();
+            let shot = part.par_iter_mut().with_min_len(4).map(|(leaf, weights)| {
+                let (mut slots, mut rays) = (weights.iter_mut(), 0);
                 push.each(light, links, *leaf, |place, at| {
                     if let Some(slot) = slots.next() {
-                        *slot = place.weight(light, &links.all()[at], (push.spreads[at], push.means[at]));
+                        let (weight, shot) = place.weight(light, &links.all()[at], (push.spreads[at], push.means[at]));
+                        *slot = weight;
+                        rays += u64::from(shot);
                     }
                 });
+                rays
             });
+            rays += shot.sum::<u64>();
         }
+        push.rays = rays;
         push.weights = weights;
         push
     }
@@ -236,18 +246,24 @@ impl Place {
     /// What a link brings to the leaf over what it brings to its receiver, by orientation and distance alone.
     fn plain<L: LightField>(&self, light: Light<'_, L>, link: &Link, spread: Spread) -> f32 {
         let known = link.visibility.abs() / visible(link, spread).max(f32::MIN_POSITIVE);
+        self.turned(light, link) * known
+    }
+
+    /// The same as if the link's sender were seen as much of from everywhere.
+    fn turned<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> f32 {
         if light.element(link.receiver).is_flat() {
-            return known;
+            return 1.0;
         }
         let element = light.element(self.leaf);
         let (direction, scale) = renewed(light, link.sender, element.center, link.receiver);
-        element.mean_cosine(direction) * scale * known
+        element.mean_cosine(direction) * scale
     }
 
-    /// The same as asked for; `mean` is what the link would bring to its receiver if it were wholly visible.
-    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, (spread, mean): (Spread, f32)) -> f32 {
+    /// The same as asked for, and the number of rays shot; `mean` is what the link would bring to its receiver if it were wholly
+    /// visible.
+    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, (spread, mean): (Spread, f32)) -> (f32, u32) {
         if spread != Spread::Exact {
-            return self.plain(light, link, spread);
+            return (self.plain(light, link, spread), 0);
         }
         let element = light.element(self.leaf);
         let visible = visible(link, spread);
@@ -256,11 +272,8 @@ impl Place {
         let apart = sender.center.distance_squared(element.center);
         let reach = element.radius + sender.radius;
         let far = reach * reach < FAR * FAR * apart;
-        if far {
-            let plain = self.plain(light, link, spread);
-            if mean * visible * plain < self.faint {
-                return plain;
-            }
+        if far && mean * visible * self.turned(light, link) < self.faint {
+            return (self.plain(light, link, spread), 0);
         }
         let here = if element.is_flat() || !far {
             let at = |&(x, n, weight): &(Vec3, Vec3, f32)| {
@@ -273,33 +286,23 @@ impl Place {
             irradiance.element_sum() * element.mean_cosine(direction)
         };
         if here <= 0.0 {
-            return 0.0;
+            return (0.0, 0);
         }
-        let mut weight = (here / mean).min(MOST_WEIGHT);
-        if link.visibility >= 0.0 {
-            weight *= self.seen(light, link, here * visible) / visible;
+        let weight = (here / mean).min(MOST_WEIGHT);
+        if link.visibility < 0.0 {
+            return (weight, 0);
         }
-        weight
+        let (seen, rays) = self.seen(light, link, here * visible);
+        (weight * seen / visible, rays)
     }
 
-    /// Share of a link's sender that the leaf sees, by as many rays as what it brings is worth.
-    fn seen<L: LightField>(&self, light: Light<'_, L>, link: &Link, brings: f32) -> f32 {
+    /// Share of a link's sender that the leaf sees, by as many rays as what it brings is worth, and their number.
+    fn seen<L: LightField>(&self, light: Light<'_, L>, link: &Link, brings: f32) -> (f32, u32) {
         let irradiance = light.exitant.irradiance[self.leaf as usize].element_sum();
-        let rays = (RAYS * brings / irradiance.max(f32::MIN_POSITIVE)).clamp(1.0, MOST_RAYS) as u32;
-        let (surface, seed) = (light.element(self.leaf).source, hash(self.leaf, link.sender));
-        let center = light.element(link.sender).center;
-        let faces = |&&(x, n, _): &&(Vec3, Vec3, f32)| (center - x).dot(n) > 0.0;
-        let mut facing: SmallVec<[(Vec3, Vec3, f32); 4]> = self.points.iter().filter(faces).copied().collect();
-        if facing.is_empty() {
-            facing.clone_from(&self.points);
-        }
-        // Few rays are dealt to some of the points.
-        let looks = (rays as usize).min(facing.len());
-        let look = |i: usize| {
-            let (x, n, _) = facing[(seed as usize + i) % facing.len()];
-            visibility_at(light, (x, n, surface), link.sender, rays / looks as u32, seed)
-        };
-        (0..looks).map(look).sum::<f32>() / looks as f32
+        let rays = (RAYS * brings / irradiance.max(f32::MIN_POSITIVE)).clamp(LEAST_RAYS, MOST_RAYS) as u32;
+        let mut blocker = u32::MAX;
+        let (seen, total, rays) = visibility(light, self.leaf, link.sender, 0..rays, &mut blocker);
+        (if total > 0.0 { seen / total } else { 0.0 }, rays)
     }
 }
 

@@ -5,7 +5,7 @@ use crate::geometry::{Domain, Geometry};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::sampling::{hash, point2, point4, unit};
-use crate::transport::Light;
+use crate::transport::{Exitant, Light};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
 
@@ -13,61 +13,96 @@ use smallvec::SmallVec;
 const NEAR: f32 = 2.0;
 /// … over so many levels.
 const NEAR_LEVELS: u32 = 4;
+/// Radiosities that differ by no more than this share are taken to be the same.
+const EVENLY: f32 = 0.1;
 
 /// A point on a surface below a node.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Point {
-    pub(crate) at: Vec3,
-    pub(crate) normal: Vec3,
-    pub(crate) surface: u32,
+struct Point {
+    at: Vec3,
+    normal: Vec3,
+    surface: u32,
     /// Area of the part of the surface that the point was drawn from.
-    pub(crate) area: f32,
+    area: f32,
     /// How much rarer the point was drawn than by area and density.
-    pub(crate) rarity: f32,
+    rarity: f32,
 }
 
-/// Draws a point below a node: down the tree in proportion to each child's area times `density`, then uniformly on
-/// the surface. Children near `from` are drawn more often than that, as more of what leaves them goes there.
-pub(crate) fn draw(
+/// How densely the points of a node are drawn.
+#[derive(Clone, Copy, Debug)]
+enum Density<'a> {
+    Uniform,
+    /// By power: what a lamp among walls sends is not seen where the walls are.
+    Power(&'a Exitant),
+    /// Where light is of importance; what nothing reaches does not count as hidden.
+    Receiving,
+}
+
+impl Density<'_> {
+    /// Relative density of a node's points.
+    fn of(self, elements: &Elements, node: usize) -> f32 {
+        match self {
+            Self::Uniform => 1.0,
+            Self::Power(exitant) => exitant.radiosity[node].element_sum() + f32::MIN_POSITIVE,
+            Self::Receiving if elements.nodes[node].importance > 0.0 => elements.exposed(node as u32),
+            Self::Receiving => 0.0,
+        }
+    }
+
+    /// Whether it is about the same all over a part of a surface.
+    fn is_even(self, elements: &Elements, node: usize) -> bool {
+        match self {
+            Self::Uniform => true,
+            Self::Power(exitant) => {
+                let [low, high] = exitant.range[node];
+                (high - low).max_element() <= EVENLY * high.max_element()
+            }
+            Self::Receiving => elements.exposed(node as u32) >= 1.0,
+        }
+    }
+}
+
+/// Draws a point below a node: down the tree in proportion to each child's area and density, then uniformly on the
+/// surface. Children near `from` are drawn more often than that, as more of what leaves them goes there.
+fn draw(
     scene: &SceneData,
     elements: &Elements,
     mut node: u32,
-    mut choice: f32,
-    u: Vec2,
-    density: impl Fn(usize) -> f32,
+    (mut choice, u): (f32, Vec2),
+    density: Density<'_>,
     from: Option<Vec3>,
 ) -> Option<Point> {
     let mut rarity = 1.0;
     loop {
         let element = &elements.nodes[node as usize];
-        match element.kind {
-            Kind::Light => return None,
-            Kind::Front | Kind::Back => {
-                let geometry = &scene.surfaces()[element.source as usize];
-                let part = match from {
-                    Some(from) => draw_part(geometry, element, from, choice),
-                    None => Part { domain: element.domain, area: element.area, rarity: 1.0 },
-                };
-                let (at, normal, _) = geometry.sample_area(part.domain, u.x, u.y);
-                let normal = if element.kind == Kind::Back { -normal } else { normal };
-                let (surface, area) = (element.source, part.area);
-                return Some(Point { at, normal, surface, area, rarity: rarity * part.rarity });
-            }
-            Kind::Cluster => {
-                let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
-                let plain = |child: usize| elements.nodes[child].area * density(child);
-                let nearness = |child: usize| {
-                    let (at, radius) = (elements.nodes[child].center, elements.nodes[child].radius);
-                    from.map_or(1.0, |from| (from.distance_squared(at) + radius * radius).max(1e-20).recip())
-                };
-                let weight = |child: usize| plain(child) * nearness(child);
-                let total: f32 = children.clone().map(weight).sum();
-                let even: f32 = children.clone().map(plain).sum();
-                let (child, rest) = pick(children.clone().map(weight), choice, total)?;
-                (node, choice) = ((children.start + child) as u32, rest);
-                rarity *= total / (even * nearness(node as usize)).max(f32::MIN_POSITIVE);
-            }
+        if element.kind == Kind::Light {
+            return None;
         }
+        let near = |from: Vec3| from.distance_squared(element.center) < NEAR * NEAR * element.radius * element.radius;
+        let whole = element.is_patch() && !from.is_some_and(near) && density.is_even(elements, node as usize);
+        if whole || element.child_count == 0 {
+            let geometry = &scene.surfaces()[element.source as usize];
+            let part = match from {
+                Some(from) => draw_part(geometry, element, from, choice),
+                None => Part { domain: element.domain, area: element.area, rarity: 1.0 },
+            };
+            let (at, normal, _) = geometry.sample_area(part.domain, u.x, u.y);
+            let normal = if element.kind == Kind::Back { -normal } else { normal };
+            let (surface, area) = (element.source, part.area);
+            return Some(Point { at, normal, surface, area, rarity: rarity * part.rarity });
+        }
+        let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
+        let plain = |child: usize| elements.nodes[child].area * density.of(elements, child);
+        let nearness = |child: usize| {
+            let (at, radius) = (elements.nodes[child].center, elements.nodes[child].radius);
+            from.map_or(1.0, |from| (from.distance_squared(at) + radius * radius).max(1e-20).recip())
+        };
+        let weight = |child: usize| plain(child) * nearness(child);
+        let total: f32 = children.clone().map(weight).sum();
+        let even: f32 = children.clone().map(plain).sum();
+        let (child, rest) = pick(children.clone().map(weight), choice, total)?;
+        (node, choice) = ((children.start + child) as u32, rest);
+        rarity *= total / (even * nearness(node as usize)).max(f32::MIN_POSITIVE);
     }
 }
 
@@ -127,55 +162,78 @@ const TRIES: u32 = 6;
 /// and the number of rays shot. All 0 where no drawn pair faced each other.
 #[must_use]
 pub(crate) fn visibility<L: LightField>(
-    Light { scene, elements, exitant, .. }: Light<'_, L>,
+    light: Light<'_, L>,
     receiver: u32,
     sender: u32,
     range: std::ops::Range<u32>,
     blocker: &mut u32,
 ) -> (f32, f32, u32) {
-    // Points of a sender are drawn by their power: what a lamp among walls sends is not seen where the walls are.
-    let power = |child: usize| exitant.radiosity[child].element_sum() + f32::MIN_POSITIVE;
     let seed = hash(receiver, sender);
+    let segments =
+        range.filter_map(|i| (0..TRIES).find_map(|attempt| segment(light, receiver, sender, (seed, i, attempt))));
+    shoot(light.scene, segments, blocker)
+}
+
+/// Shoots segments: the weight that is not blocked, that of all, and the number of rays.
+fn shoot(scene: &SceneData, segments: impl Iterator<Item = Segment>, blocker: &mut u32) -> (f32, f32, u32) {
     let (mut seen, mut total, mut rays) = (0.0, 0.0, 0);
-    let source = &elements.nodes[sender as usize];
-    for i in range {
-        for attempt in 0..TRIES {
-            let (index, round) = (i + attempt * 0x1_0000, seed ^ attempt.wrapping_mul(0x9E37));
-            let u = point4(seed, index);
-            let choices = [unit(hash(round ^ 0x5bd1, i)), unit(hash(round ^ 0x1b87, i))];
-            let important = |child: usize| if elements.nodes[child].importance > 0.0 { 1.0 } else { 0.0 };
-            let Some(r) = draw(scene, elements, receiver, choices[0], Vec2::new(u.x, u.y), important, None) else {
-                continue;
-            };
-            let (target, weight, surface) = match source.kind {
-                Kind::Light => {
-                    let (to, cosine) = light_segment(scene, source.source as usize, r.at, r.normal);
-                    (to, cosine, u32::MAX)
-                }
-                _ => {
-                    let Some(s) = draw(scene, elements, sender, choices[1], Vec2::new(u.z, u.w), power, Some(r.at))
-                    else {
-                        continue;
-                    };
-                    let to = s.at - r.at;
-                    let d2 = to.length_squared();
-                    let (a, b) = (to.dot(r.normal), -to.dot(s.normal));
-                    let weight =
-                        if a > 0.0 && b > 0.0 && d2 > 0.0 { kernel(a * b, d2, s.area) * s.rarity } else { 0.0 };
-                    (s.at, weight, s.surface)
-                }
-            };
-            if weight > 0.0 {
-                rays += 1;
-                total += weight;
-                if !scene.visibility.occluded(r.at, target, [r.surface, surface], blocker) {
-                    seen += weight;
-                }
-                break;
-            }
+    for segment in segments {
+        rays += 1;
+        total += segment.weight;
+        if !scene.visibility.occluded(segment.from, segment.to, segment.surfaces, blocker) {
+            seen += segment.weight;
         }
     }
     (seen, total, rays)
+}
+
+/// A segment between two points that face each other.
+struct Segment {
+    from: Vec3,
+    to: Vec3,
+    surfaces: [u32; 2],
+    weight: f32,
+}
+
+/// One attempt at the segment of an index: `None` where its points do not face each other.
+fn segment<L: LightField>(
+    Light { scene, elements, exitant, .. }: Light<'_, L>,
+    receiver: u32,
+    sender: u32,
+    (seed, i, attempt): (u32, u32, u32),
+) -> Option<Segment> {
+    let (index, round) = (i + attempt * 0x1_0000, seed ^ attempt.wrapping_mul(0x9E37));
+    let u = point4(seed, index);
+    let choices = [unit(hash(round ^ 0x5bd1, i)), unit(hash(round ^ 0x1b87, i))];
+    let (on, of) = ((choices[0], Vec2::new(u.x, u.y)), (choices[1], Vec2::new(u.z, u.w)));
+    let on_receiver = |from| draw(scene, elements, receiver, on, Density::Receiving, from);
+    let on_sender = |from| draw(scene, elements, sender, of, Density::Power(exitant), from);
+    let (target, source) = (&elements.nodes[receiver as usize], &elements.nodes[sender as usize]);
+    if source.kind == Kind::Light {
+        let r = on_receiver(None)?;
+        let (to, weight) = light_segment(scene, source.source as usize, r.at, r.normal);
+        return (weight > 0.0).then_some(Segment { from: r.at, to, surfaces: [r.surface, u32::MAX], weight });
+    }
+    // Of the larger one most of what matters is near the other.
+    let (r, s, part) = if target.radius > source.radius {
+        let s = on_sender(None)?;
+        let r = on_receiver(Some(s.at))?;
+        (r, s, r)
+    } else {
+        let r = on_receiver(None)?;
+        let s = on_sender(Some(r.at))?;
+        (r, s, s)
+    };
+    let to = s.at - r.at;
+    let d2 = to.length_squared();
+    let (a, b) = (to.dot(r.normal), -to.dot(s.normal));
+    let faces = a > 0.0 && b > 0.0 && d2 > 0.0;
+    faces.then(|| Segment {
+        from: r.at,
+        to: s.at,
+        surfaces: [r.surface, s.surface],
+        weight: kernel(a * b, d2, part.area) * part.rarity,
+    })
 }
 
 /// The transfer's kernel by the product of both cosines × distance, the squared distance and the sender's area. Surfaces
@@ -193,8 +251,8 @@ pub(crate) fn any_facing<L: LightField>(light: Light<'_, L>, receiver: u32, send
     (0..count).any(|i| {
         let u = point4(seed, i);
         let choices = [unit(hash(seed ^ 0x5bd1, i)), unit(hash(seed ^ 0x1b87, i))];
-        let r = draw(scene, elements, receiver, choices[0], Vec2::new(u.x, u.y), |_| 1.0, None);
-        let s = draw(scene, elements, sender, choices[1], Vec2::new(u.z, u.w), |_| 1.0, None);
+        let r = draw(scene, elements, receiver, (choices[0], Vec2::new(u.x, u.y)), Density::Uniform, None);
+        let s = draw(scene, elements, sender, (choices[1], Vec2::new(u.z, u.w)), Density::Uniform, None);
         let (Some(r), Some(s)) = (r, s) else { return true };
         let to = s.at - r.at;
         to.dot(r.normal) > 0.0 && to.dot(s.normal) < 0.0
@@ -229,26 +287,19 @@ pub(crate) fn visibility_at<L: LightField>(
         let free = cosine > 0.0 && !scene.visibility.occluded(x, to, [surface, u32::MAX], &mut blocker);
         return if free { 1.0 } else { 0.0 };
     }
-    let power = |child: usize| exitant.radiosity[child].element_sum() + f32::MIN_POSITIVE;
     let seed = hash(seed, sender);
-    let (mut seen, mut total) = (0.0, 0.0);
-    for i in 0..count {
-        for attempt in 0..TRIES {
-            let (index, round) = (i + attempt * 0x1_0000, seed ^ attempt.wrapping_mul(0x9E37));
-            let choice = unit(hash(round ^ 0x68e3, i));
-            let Some(s) = draw(scene, elements, sender, choice, point2(seed, index), power, Some(x)) else { continue };
-            let to = s.at - x;
-            let d2 = to.length_squared();
-            let (a, b) = (to.dot(n), -to.dot(s.normal));
-            if a > 0.0 && b > 0.0 && d2 > 0.0 {
-                let weight = kernel(a * b, d2, s.area) * s.rarity;
-                total += weight;
-                if !scene.visibility.occluded(x, s.at, [surface, s.surface], &mut blocker) {
-                    seen += weight;
-                }
-                break;
-            }
-        }
-    }
+    let segment = |i: u32, attempt: u32| {
+        let (index, round) = (i + attempt * 0x1_0000, seed ^ attempt.wrapping_mul(0x9E37));
+        let choice = unit(hash(round ^ 0x68e3, i));
+        let s = draw(scene, elements, sender, (choice, point2(seed, index)), Density::Power(exitant), Some(x))?;
+        let to = s.at - x;
+        let d2 = to.length_squared();
+        let (a, b) = (to.dot(n), -to.dot(s.normal));
+        let weight = kernel(a * b, d2, s.area) * s.rarity;
+        let faces = a > 0.0 && b > 0.0 && d2 > 0.0;
+        faces.then_some(Segment { from: x, to: s.at, surfaces: [surface, s.surface], weight })
+    };
+    let segments = (0..count).filter_map(|i| (0..TRIES).find_map(|attempt| segment(i, attempt)));
+    let (seen, total, _) = shoot(scene, segments, &mut blocker);
     if total > 0.0 { seen / total } else { 0.0 }
 }

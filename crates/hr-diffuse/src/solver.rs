@@ -446,6 +446,7 @@ impl<L: LightField> Solver<L> {
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
         self.gather = Gather::new(self.light(), &self.links, error, room, watch);
         self.prepared = closely;
+        self.stats.rays += self.gather.rays();
         self.stats.skipped.faint_links = self.gather.faint_links();
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }

@@ -111,6 +111,8 @@ struct Session {
     watched: Watched,
     looked: Instant,
     scene: Option<Arc<Scene>>,
+    /// What the solution to come goes on from.
+    begun: Option<(Solved, Accuracy)>,
     /// Whether it is no longer what the file says; then it is not kept.
     is_edited: bool,
     /// Whether there is something in the window.
@@ -140,6 +142,7 @@ impl Session {
             looked: now,
             told: now,
             scene: None,
+            begun: None,
             is_edited: false,
             has_shown: false,
             loaded: 0.0,
@@ -240,6 +243,11 @@ impl Session {
             self.status.asked = accuracy.asked;
             return self.show(solved, accuracy);
         }
+        if let Some(path) = &self.args.resume {
+            self.begun = Some(solution_file::load(path, scene)?);
+            self.tasks.push_back(Task::Solve { error: self.status.asked, in_any_case: false });
+            return Ok(());
+        }
         self.tasks.push_back(Task::Glance);
         let coarse = self.status.asked * COARSER;
         if coarse <= COARSEST {
@@ -264,12 +272,17 @@ impl Session {
         // Mirrors are shown by their distributions in any mode; what is kept is for every mode.
         let mirrors = || scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
         let wants_distributions = self.args.mode == Mode::Distributions || self.args.save.is_some() || mirrors();
+        let begun = self.begun.take();
         self.interrupt = Some(Interrupt::listen());
         let ask = &mut |state: &hr_diffuse::Progress| match self.attend(state) {
             Wanted::Whole if is_sketch && state.phase == Phase::Reconstruct => Wanted::Now,
             wanted => wanted,
         };
-        let found = Solved::awaited(Arc::clone(&scene), settings, wants_distributions && !is_sketch, ask);
+        let distributions = wants_distributions && !is_sketch;
+        let found = match begun {
+            Some((solved, accuracy)) => solved.resumed(settings, distributions, accuracy, ask),
+            None => Solved::awaited(scene, settings, distributions, ask),
+        };
         self.interrupt = None;
         let (solved, mut accuracy) = found?;
         accuracy.asked = self.status.asked;
