@@ -303,3 +303,92 @@ pub(crate) fn visibility_at<L: LightField>(
     let (seen, total, _) = shoot(scene, segments, &mut blocker);
     if total > 0.0 { seen / total } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::DVec3;
+
+    /// A floor and a ceiling that is bright in one corner; a sheet between them hides all but that corner.
+    fn solver() -> (Solver, [u32; 2]) {
+        let quad = |z: f64, a: DVec3, b: DVec3| {
+            Shape::Quad([0.0, 1.0, 2.0, 3.0].map(|i| {
+                let at = DVec3::new(0.0, 0.0, z);
+                if i == 0.0 {
+                    at
+                } else if i == 1.0 {
+                    at + a
+                } else if i == 2.0 {
+                    at + a + b
+                } else {
+                    at + b
+                }
+            }))
+        };
+        let (x, y) = (DVec3::X, DVec3::Y);
+        let shapes = vec![quad(0.0, x, y), quad(1.0, y, x)];
+        let [low, mid, high] = [0.0, 0.5, 1.0];
+        let part = |from: [f64; 2], to: [f64; 2]| {
+            let corner = |x: f64, y: f64| DVec3::new(x, y, 0.99);
+            Shape::Quad([
+                corner(from[0], from[1]),
+                corner(to[0], from[1]),
+                corner(to[0], to[1]),
+                corner(from[0], to[1]),
+            ])
+        };
+        let sheets = [part([mid, low], [high, high]), part([low, mid], [mid, high])];
+        let surfaces = shapes.into_iter().chain(sheets).map(|shape| Surface::new(shape, 0)).collect();
+        let material = DiffuseMaterial { reflectance: Rgb::splat(0.5), exitance: Rgb::ZERO, two_sided: true };
+        let input = SceneInput { surfaces, materials: vec![material], ..SceneInput::default() };
+        let mut solver = Solver::new(&input, Settings::with_error(0.1), ()).expect("the scene is sound");
+        let [floor, ceiling] = [0, 1].map(|surface| solver.elements.surface_nodes[surface][0]);
+        solver.elements.split(&solver.scene, ceiling);
+        let count = solver.elements.nodes.len();
+        let exitant = &mut solver.exitant;
+        exitant.radiosity.resize(count, Rgb::splat(0.01));
+        exitant.range.resize(count, [Rgb::splat(0.01); 2]);
+        (solver, [floor, ceiling])
+    }
+
+    /// What is seen of a sender counts by its power, not by its area.
+    #[test]
+    fn what_is_seen_is_weighed_by_radiosity() {
+        let (mut solver, [floor, ceiling]) = solver();
+        let element = solver.elements.nodes[ceiling as usize];
+        let children = element.first_child..element.first_child + element.child_count;
+        let bright = children.clone().find(|&child| {
+            let at = solver.scene.normalization.to_scene(solver.elements.nodes[child as usize].center);
+            at.x < 0.5 && at.y < 0.5
+        });
+        let bright = bright.expect("one of four parts is in the corner") as usize;
+        let see = |solver: &Solver| {
+            let mut blocker = u32::MAX;
+            let (seen, total, rays) = visibility(solver.light(), floor, ceiling, 0..512, &mut blocker);
+            assert!(rays > 500, "the two face each other: {rays}");
+            seen / total
+        };
+        let even = see(&solver);
+        assert!((even - 0.25).abs() < 0.05, "a fourth of it is open: {even}");
+        solver.exitant.radiosity[bright] = Rgb::ONE;
+        solver.exitant.range[ceiling as usize] = [Rgb::splat(0.01), Rgb::ONE];
+        let (seen, bright_share) = (see(&solver), 1.0 / 1.03);
+        assert!((seen - bright_share).abs() < 0.05, "nearly all of its light passes: {seen}");
+    }
+
+    /// The larger of two elements is drawn from near the smaller one: the same as with many segments between plain points.
+    #[test]
+    fn small_elements_below_large_ones_see_what_is_there() {
+        let (solver, [floor, ceiling]) = solver();
+        let part = solver.elements.nodes[ceiling as usize].first_child;
+        for pair in [[floor, part], [part, floor], [floor, ceiling]] {
+            let [few, many] = [64, 8192].map(|count| {
+                let mut blocker = u32::MAX;
+                let (seen, total, _) = visibility(solver.light(), pair[0], pair[1], 0..count, &mut blocker);
+                seen / total
+            });
+            assert!((few - many).abs() < 0.12, "{pair:?}: {few}, {many}");
+        }
+    }
+}

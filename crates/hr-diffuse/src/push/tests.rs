@@ -1,8 +1,9 @@
-use super::{Push, Spread, visible};
+use super::{FAINT_SHARE, LEAST_VISIBLE, Push, Spread, visible};
 use crate::gather::Group;
-use crate::links::Link;
+use crate::links::{Link, Links};
 use crate::skips::Skips;
 use crate::skips::tests::{room, solve};
+use glam::Vec3;
 use std::ops::ControlFlow;
 
 const ERROR: f32 = 0.1;
@@ -63,4 +64,44 @@ fn weights_that_are_not_kept_are_found_again() {
         total += light.element(leaf).area * kept;
     }
     assert!(total > 0.0 && (apart / total).abs() < ERROR, "{apart} of {total}");
+}
+
+/// Where all segments of a link happened to be blocked, leaves look for themselves: none of its light is lost.
+#[test]
+fn links_that_look_blocked_lose_nothing() {
+    const FINE: f32 = 0.2 * ERROR;
+    let solver = solve(&room(), ERROR, (), Skips::ALL);
+    let light = solver.light();
+    let watch = &mut || ControlFlow::Continue(());
+    let spreads = Push::new(light, &solver.links, Some(FINE), 0, watch).spreads;
+    // Links that still matter with the least that is taken to be visible.
+    let blocked = |(link, spread): (&Link, &Spread)| {
+        let partial = link.visibility > 0.1 && link.visibility < 1.0;
+        let brings = light.emitted(link.sender, Vec3::Z).element_sum() * link.factor;
+        let all = light.exitant.irradiance[link.receiver as usize].element_sum();
+        let matters = brings * LEAST_VISIBLE > 2.0 * FAINT_SHARE * FINE * all;
+        let flat = light.element(link.receiver).is_flat() && light.element(link.sender).is_flat();
+        *spread == Spread::Exact && partial && matters && flat
+    };
+    let chosen: Vec<Link> =
+        solver.links.all().iter().zip(&spreads).filter(|both| blocked(*both)).map(|(link, _)| *link).collect();
+    assert!(!chosen.is_empty(), "there are such links");
+    let nodes = light.elements.nodes.len();
+    let brought = |visibility: fn(f32) -> f32| {
+        let links = chosen.iter().map(|link| Link { visibility: visibility(link.visibility), ..*link }).collect();
+        let links = Links::new(links, nodes);
+        let push = Push::new(light, &links, Some(FINE), u64::MAX, &mut || ControlFlow::Continue(()));
+        let carries = |(link, spread): (&Link, &Spread)| {
+            light.emitted(link.sender, Vec3::Z).element_sum() * link_share(link, *spread)
+        };
+        let arriving: Vec<f32> = links.all().iter().zip(&push.spreads).map(carries).collect();
+        let (groups, even) = (vec![Group::Rest; links.all().len()], vec![[0.0; 3]; nodes]);
+        let leaf = |index: usize| {
+            let area = light.element(push.leaves[index]).area;
+            area * push.sum(light, &links, index, (&groups, &arriving, &even)).iter().sum::<f32>()
+        };
+        (0..push.leaves.len()).map(leaf).sum::<f32>()
+    };
+    let (open, blocked) = (brought(|visibility| visibility), brought(|_| 0.0));
+    assert!((blocked / open - 1.0).abs() < 0.1, "{blocked} of {open}");
 }
