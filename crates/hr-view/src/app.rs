@@ -6,18 +6,17 @@ use crate::camera_path::CameraPath;
 use crate::export;
 use crate::glossy::Mode;
 use crate::html;
-use crate::interrupt::Interrupt;
+use crate::interrupt::{Interrupt, STOPPING};
+use crate::loading::load;
 use crate::progress::Progress;
 use crate::raycast::RayCaster;
 use crate::session;
-use crate::solution_file::{self, Accuracy};
-use crate::solved::{Solved, Wanted};
-use crate::stats::{Times, stats};
+use crate::solution_file;
+use crate::solved::{Accuracy, Solved, Wanted};
+use crate::stats::{self, Times};
 use crate::window::WindowError;
 use hr_diffuse::{Budget, Phase, Settings};
-use hr_scene::whole_file::write_whole;
 use hr_scene::{Camera, Exposure, ImageKind, Rgb, Scene, SceneError, ToneMap};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -34,12 +33,6 @@ const METER_SIZE: [u32; 2] = [64, 40];
 
 /// Where frames go when there is no window and nobody said where.
 const FALLBACK_FRAMES: &str = "hr-view-frames";
-
-/// What Ctrl-C is answered with.
-pub(crate) const STOPPING: &str = "stopping, this shows what there is; Ctrl-C again ends the program";
-
-/// So many warnings about the scene are told; of the others, how many there are.
-const MOST_WARNINGS: usize = 8;
 
 /// How a solution is to be shown.
 enum Output {
@@ -154,27 +147,6 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
     }
 }
 
-/// The scene, with the camera of the command line first.
-pub(crate) fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
-    progress.at(&format!("loading {}", args.scene), 0.0);
-    // The camera first: it is read at once, and a mistake in it shows before the wait for a large scene.
-    let camera = args.camera.as_deref().map(Camera::load).transpose()?;
-    let mut scene = Scene::load(&args.scene)?;
-    for warning in scene.warnings.iter().take(MOST_WARNINGS) {
-        let times = if warning.count > 1 { format!(", {} times", warning.count) } else { String::new() };
-        progress.say(&format!("warning: {} ({}{times})", warning.text, warning.first));
-    }
-    if let Some(more) = scene.warnings.len().checked_sub(MOST_WARNINGS).filter(|more| *more > 0) {
-        progress.say(&format!("warning: {more} more kinds of warnings"));
-    }
-    if let Some(camera) = camera {
-        scene.cameras.insert(0, ("--camera".to_owned(), camera));
-    } else if scene.cameras.is_empty() {
-        scene.cameras.push(("default".to_owned(), scene.default_camera()));
-    }
-    Ok(Arc::new(scene))
-}
-
 /// Solves for the light, or goes on with what was begun, to the accuracy asked for, or until the time is up or the user has
 /// seen enough. Also tells how exact the solution is.
 fn solve(
@@ -261,16 +233,6 @@ impl Show<'_> {
         let now = self.progress.elapsed();
         let times =
             Times { load: self.loaded.as_secs_f64(), show: (now - self.begin).as_secs_f64(), total: now.as_secs_f64() };
-        write_stats(path, self.solved, self.accuracy, &times)
+        stats::write(path, self.solved, self.accuracy, &times)
     }
-}
-
-/// Writes the statistics of a solution.
-pub(crate) fn write_stats(path: &Path, solved: &Solved, accuracy: Accuracy, times: &Times) -> Result<(), ViewError> {
-    let stats = stats(solved, accuracy, times);
-    write_whole(path, |out| {
-        serde_json::to_writer_pretty(&mut *out, &stats)?;
-        writeln!(out)
-    })?;
-    Ok(())
 }

@@ -4,6 +4,9 @@ use hr_scene::whole_file::abandon;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
+/// What Ctrl-C is answered with.
+pub(crate) const STOPPING: &str = "stopping, this shows what there is; Ctrl-C again ends the program";
+
 /// Where Ctrl-C does not stop a solve: it ends the program, as everywhere.
 const ENDS: u8 = 0;
 /// A solve is running that it can stop.

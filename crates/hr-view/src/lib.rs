@@ -12,6 +12,7 @@ pub mod glossy;
 pub mod html;
 pub mod inside;
 pub mod interrupt;
+mod loading;
 pub mod path_tracer;
 pub mod progress;
 pub mod raycast;

@@ -5,17 +5,17 @@
 //! meanwhile it learns between two steps of the solver. Every solution is solved for anew: the old one stays in the
 //! window until then.
 
-use crate::app::{STOPPING, load, write_stats};
 use crate::args::Args;
 use crate::camera_path::CameraPath;
 use crate::edits::{brightened, roughened};
 use crate::error::ViewError;
 use crate::glossy::Mode;
-use crate::interrupt::Interrupt;
+use crate::interrupt::{Interrupt, STOPPING};
+use crate::loading::load;
 use crate::progress::{Progress, activity};
-use crate::solution_file::{self, Accuracy};
-use crate::solved::{Solved, Wanted};
-use crate::stats::Times;
+use crate::solution_file;
+use crate::solved::{Accuracy, Solved, Wanted};
+use crate::stats::{self, Times};
 use crate::walkthrough::Walkthrough;
 use crate::watched::Watched;
 use crate::window::{self, Screen, Status, WindowOptions, Wish};
@@ -79,7 +79,7 @@ impl Results {
             solution_file::save(path, solved, *accuracy)?;
         }
         if let Some(path) = &args.stats {
-            write_stats(path, solved, *accuracy, times)?;
+            stats::write(path, solved, *accuracy, times)?;
         }
         Ok(())
     }

@@ -5,7 +5,7 @@
 //! byte can be missing or wrong unnoticed. Geometry and materials are not in the file: they come from the scene, whose
 //! [fingerprint](hr_scene::Scene::fingerprint) must be the one in the head.
 
-use crate::solved::Solved;
+use crate::solved::{Accuracy, Solved};
 use glossy_ext::GlossyField;
 use glossy_ext::haar::Refinement;
 use hr_diffuse::Solution;
@@ -77,16 +77,6 @@ pub enum SolutionError {
         /// What is wrong.
         source: RestoreError,
     },
-}
-
-/// How exact a solution is.
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Accuracy {
-    /// The relative error asked for.
-    pub asked: f32,
-    /// The relative error that the solution is believed to have.
-    pub believed: f32,
 }
 
 /// What the file begins with.

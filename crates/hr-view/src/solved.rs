@@ -1,6 +1,5 @@
 //! From a scene to its solution.
 
-use crate::solution_file::Accuracy;
 use glossy_ext::GlossyField;
 use glossy_ext::haar::Refinement;
 use hr_diffuse::{Phase, Progress, Settings, Solution, SolveError, Solver};
@@ -21,6 +20,16 @@ pub enum Wanted {
     Now,
     /// Nothing any more, as soon as may be.
     Nothing,
+}
+
+/// How exact a solution is.
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Accuracy {
+    /// The relative error asked for.
+    pub asked: f32,
+    /// The relative error that the solution is believed to have.
+    pub believed: f32,
 }
 
 /// A scene and the light in it.

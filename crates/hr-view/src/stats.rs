@@ -1,9 +1,12 @@
 //! What `--stats` writes: times, counts, what was skipped and why.
 
-use crate::solution_file::Accuracy;
-use crate::solved::Solved;
+use crate::ViewError;
+use crate::solved::{Accuracy, Solved};
 use hr_diffuse::Spent;
+use hr_scene::whole_file::write_whole;
 use serde_json::{Value, json};
+use std::io::Write;
+use std::path::Path;
 
 /// Seconds that the solver does not know of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -83,6 +86,16 @@ pub fn peak_bytes() -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kibibytes * 1024)
+}
+
+/// Writes the statistics of a solution.
+pub(crate) fn write(path: &Path, solved: &Solved, accuracy: Accuracy, times: &Times) -> Result<(), ViewError> {
+    let stats = stats(solved, accuracy, times);
+    write_whole(path, |out| {
+        serde_json::to_writer_pretty(&mut *out, &stats)?;
+        writeln!(out)
+    })?;
+    Ok(())
 }
 
 #[cfg(test)]

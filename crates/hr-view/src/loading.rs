@@ -1,0 +1,31 @@
+//! Loading the scene that the command line names.
+
+use crate::ViewError;
+use crate::args::Args;
+use crate::progress::Progress;
+use hr_scene::{Camera, Scene};
+use std::sync::Arc;
+
+/// So many warnings about the scene are told; of the others, how many there are.
+const MOST_WARNINGS: usize = 8;
+
+/// The scene, with the camera of the command line first.
+pub(crate) fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
+    progress.at(&format!("loading {}", args.scene), 0.0);
+    // The camera first: it is read at once, and a mistake in it shows before the wait for a large scene.
+    let camera = args.camera.as_deref().map(Camera::load).transpose()?;
+    let mut scene = Scene::load(&args.scene)?;
+    for warning in scene.warnings.iter().take(MOST_WARNINGS) {
+        let times = if warning.count > 1 { format!(", {} times", warning.count) } else { String::new() };
+        progress.say(&format!("warning: {} ({}{times})", warning.text, warning.first));
+    }
+    if let Some(more) = scene.warnings.len().checked_sub(MOST_WARNINGS).filter(|more| *more > 0) {
+        progress.say(&format!("warning: {more} more kinds of warnings"));
+    }
+    if let Some(camera) = camera {
+        scene.cameras.insert(0, ("--camera".to_owned(), camera));
+    } else if scene.cameras.is_empty() {
+        scene.cameras.push(("default".to_owned(), scene.default_camera()));
+    }
+    Ok(Arc::new(scene))
+}
