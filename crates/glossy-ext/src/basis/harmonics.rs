@@ -165,6 +165,13 @@ impl Harmonics {
         sum
     }
 
+    /// Largest sum of the terms' sizes in any direction: the squares of all harmonics in one direction add up to
+    /// (last + 1)² / 4π, by the addition theorem.
+    fn terms(&self) -> Rgb {
+        let squares: Rgb = self.coefficients.iter().map(|&c| c * c).sum();
+        squares.map(f32::sqrt) * ((f32::from(self.last()) + 1.0) / (4.0 * PI).sqrt())
+    }
+
     /// Largest slope, per radian and channel: by the addition theorem the squares of the derivatives of the harmonics of
     /// order l in one direction add up to l (l + 1) (2l + 1) / 8π everywhere.
     fn slope(&self) -> Rgb {
@@ -264,9 +271,9 @@ impl Basis for Harmonics {
                 (low, high) = (low.min(value), high.max(value));
             }
         }
-        // No direction is farther than half a step from a ring, nor that place from a point by more than another half. Rounding:
-        // the terms of the sum are up to √(functions) times as large as it is.
-        let slack = self.slope() * (step + 1e-5) + low.abs().max(high.abs()) * 1e-5;
+        // No direction is farther than half a step from a ring, nor that place from a point by more than another half. Rounding
+        // is that of the terms, which may be far larger than their sum.
+        let slack = self.slope() * (step + 1e-5) + self.terms() * 1e-5;
         (low - slack, high + slack)
     }
 
