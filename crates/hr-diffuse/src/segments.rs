@@ -224,20 +224,22 @@ fn segment<L: LightField>(
         let s = on_sender(Some(r.at))?;
         (r, s, s)
     };
-    let to = s.at - r.at;
-    let d2 = to.length_squared();
-    let (a, b) = (to.dot(r.normal), -to.dot(s.normal));
-    let faces = a > 0.0 && b > 0.0 && d2 > 0.0;
-    faces.then(|| Segment {
-        from: r.at,
-        to: s.at,
-        surfaces: [r.surface, s.surface],
-        weight: kernel(a * b, d2, part.area) * part.rarity,
-    })
+    between((r.at, r.normal, r.surface), &s, part)
 }
 
-/// The transfer's kernel by the product of both cosines × distance, the squared distance and the sender's area. Surfaces
-/// may be so small and near that its square is 0 in f32.
+/// The segment from a point with normal and surface to one of a sender, weighted by the transfer's kernel; `part` is the one of
+/// both ends that was drawn for the other.
+fn between((x, n, surface): (Vec3, Vec3, u32), s: &Point, part: Point) -> Option<Segment> {
+    let to = s.at - x;
+    let d2 = to.length_squared();
+    let (a, b) = (to.dot(n), -to.dot(s.normal));
+    let faces = a > 0.0 && b > 0.0 && d2 > 0.0;
+    let weight = kernel(a * b, d2, part.area) * part.rarity;
+    faces.then_some(Segment { from: x, to: s.at, surfaces: [surface, s.surface], weight })
+}
+
+/// The transfer's kernel by the product of both cosines × distance, the squared distance and the area of the part that a point
+/// was drawn from. Surfaces may be so small and near that its square is 0 in f32.
 fn kernel(product: f32, d2: f32, area: f32) -> f32 {
     product / d2 / (d2 + area).max(1e-30)
 }
@@ -292,12 +294,7 @@ pub(crate) fn visibility_at<L: LightField>(
         let (index, round) = (i + attempt * 0x1_0000, seed ^ attempt.wrapping_mul(0x9E37));
         let choice = unit(hash(round ^ 0x68e3, i));
         let s = draw(scene, elements, sender, (choice, point2(seed, index)), Density::Power(exitant), Some(x))?;
-        let to = s.at - x;
-        let d2 = to.length_squared();
-        let (a, b) = (to.dot(n), -to.dot(s.normal));
-        let weight = kernel(a * b, d2, s.area) * s.rarity;
-        let faces = a > 0.0 && b > 0.0 && d2 > 0.0;
-        faces.then_some(Segment { from: x, to: s.at, surfaces: [surface, s.surface], weight })
+        between((x, n, surface), &s, s)
     };
     let segments = (0..count).filter_map(|i| (0..TRIES).find_map(|attempt| segment(i, attempt)));
     let (seen, total, _) = shoot(scene, segments, &mut blocker);
