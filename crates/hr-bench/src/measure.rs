@@ -73,10 +73,9 @@ pub fn solve(input: &SceneInput, error: f32, threads: usize, extent: Extent) -> 
     let pool = pool.map_err(|error| BenchError::Threads(error.to_string()))?;
     pool.install(|| {
         let (start, cpu) = (Instant::now(), cpu_seconds());
-        let (mut believed, mut stopped) = (f32::NAN, false);
+        let mut stopped = false;
         let mut solver = Solver::new(input, Settings::with_error(error), ())?;
-        solver.solve(&mut |progress| {
-            believed = progress.error;
+        solver.solve(&mut |_| {
             if extent.limit.is_some_and(|limit| start.elapsed() > limit) {
                 stopped = true;
                 return ControlFlow::Break(());
@@ -102,7 +101,7 @@ pub fn solve(input: &SceneInput, error: f32, threads: usize, extent: Extent) -> 
             rays: stats.rays,
             bytes: stats.bytes,
             peak,
-            believed,
+            believed: stats.error.unwrap_or(f32::NAN),
             stopped,
         };
         Ok((solution, cost))

@@ -3,7 +3,7 @@
 use crate::Rgb;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::{LightField, NodeId, Transfer};
-use crate::leaf_rows::{LeafRow, closed};
+use crate::leaf_rows::balance;
 use crate::links::{Link, Links};
 use crate::push::{self, Push, Spread, visible};
 use crate::threads::{self, prelude::*};
@@ -16,7 +16,7 @@ const BETWEEN_WATCHES: usize = 1 << 14;
 /// Bytes that are kept for each link, …
 pub(crate) const LINK_BYTES: usize = size_of::<Rgb>() + size_of::<Group>() + push::LINK_BYTES;
 /// … and for each node: its evenly spread light, and as much as leaves have.
-pub(crate) const NODE_BYTES: usize = size_of::<[Rgb; 3]>() + size_of::<[f32; 3]>() + push::LEAF_BYTES;
+pub(crate) const NODE_BYTES: usize = size_of::<[Rgb; GROUPS]>() + size_of::<[f32; GROUPS]>() + push::LEAF_BYTES;
 
 /// Whose light it is: rows of form factors treat them differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +27,15 @@ pub(crate) enum Group {
     Emitter,
     /// Other parts of surfaces, and clusters.
     Rest,
+    /// What arrives through links that leaves do not look at closely.
+    Faint,
 }
+
+/// How many there are.
+pub(crate) const GROUPS: usize = 4;
+
+/// Clusters that emit more than this share of their power count as emitters.
+const MOSTLY: f32 = 0.5;
 
 impl Group {
     /// That of a sender.
@@ -39,6 +47,18 @@ impl Group {
             Kind::Cluster | Kind::Front | Kind::Back => Self::Rest,
         }
     }
+
+    /// That of a link, by the power that is emitted below each node.
+    fn of_link<L: LightField>(light: Light<'_, L>, emitted: &[f32], link: &Link, spread: Spread) -> Self {
+        let (sender, area) = (link.sender as usize, light.element(link.sender).area);
+        match Self::of(light, link.sender) {
+            Self::Rest if emitted[sender] > MOSTLY * light.exitant.radiosity[sender].element_sum() * area => {
+                Self::Emitter
+            }
+            Self::Rest if spread != Spread::Exact && push::is_shared(light, link.receiver) => Self::Faint,
+            group => group,
+        }
+    }
 }
 
 /// What arrives through the links of a scene.
@@ -48,11 +68,11 @@ pub(crate) struct Gather {
     groups: Vec<Group>,
     push: Push,
     /// By leaf, as in `push`: what makes the sum of its form factors what it should be, by group.
-    rows: Vec<[f32; 3]>,
+    rows: Vec<[f32; GROUPS]>,
     /// Irradiance by link.
     arriving: Vec<Rgb>,
     /// Irradiance through evenly spread links, by node and group: its own and those of all above it.
-    even: Vec<[Rgb; 3]>,
+    even: Vec<[Rgb; GROUPS]>,
 }
 
 impl Gather {
@@ -64,20 +84,21 @@ impl Gather {
         room: u64,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
-        let groups: Vec<Group> = links.all().par_iter().map(|link| Group::of(light, link.sender)).collect();
         let push = Push::new(light, links, error, room, watch);
+        let emitted = light.emitted_power();
+        let group = |(link, spread): (&Link, &Spread)| Group::of_link(light, &emitted, link, *spread);
+        let groups: Vec<Group> = links.all().par_iter().zip(&push.spreads).map(group).collect();
         // The rows of form factors are what would arrive of unit radiosity.
         let shares = links.all().par_iter().zip(&push.spreads).map(|(link, spread)| share(light, link, *spread));
         let shares: Vec<f32> = shares.collect();
         let even = sums(light.elements, links, &groups, &push.spreads, &shares);
-        let closed = if error.is_some() { closed(light, &push.leaves) } else { vec![false; push.leaves.len()] };
-        let row = |index: usize| {
-            let [_, emitters, rest] = push.sum(light, links, index, (&groups, &shares, &even));
-            let exposed = light.elements.exposed(push.leaves[index]);
-            let row = LeafRow { shares: [emitters, rest], exposed, closed: closed[index] };
-            row.factors()
+        let shares = |index: usize| {
+            let [_, shares @ ..] = push.sum(light, links, index, (&groups, &shares, &even));
+            shares
         };
-        let rows = (0..push.leaves.len()).into_par_iter().with_min_len(64).map(row).collect();
+        let shares: Vec<[f32; GROUPS - 1]> =
+            (0..push.leaves.len()).into_par_iter().with_min_len(64).map(shares).collect();
+        let rows = balance(light, &push.leaves, &shares, error.is_some());
         Self { groups, push, rows, arriving: Vec::new(), even: Vec::new() }
     }
 
@@ -199,15 +220,15 @@ fn sums<T: Copy + Default + Send + Sync + std::ops::AddAssign>(
     groups: &[Group],
     spreads: &[Spread],
     arriving: &[T],
-) -> Vec<[T; 3]> {
+) -> Vec<[T; GROUPS]> {
     let sum = |node: usize| {
-        let mut sums = [T::default(); 3];
+        let mut sums = [T::default(); GROUPS];
         for at in links.range(node as u32).filter(|&at| spreads[at] == Spread::Even) {
             sums[groups[at] as usize] += arriving[at];
         }
         sums
     };
-    let mut sums: Vec<[T; 3]> = (0..elements.nodes.len()).into_par_iter().with_min_len(256).map(sum).collect();
+    let mut sums: Vec<[T; GROUPS]> = (0..elements.nodes.len()).into_par_iter().with_min_len(256).map(sum).collect();
     for node in 1..sums.len() {
         let above = sums[elements.nodes[node].parent as usize];
         for (sum, above) in sums[node].iter_mut().zip(above) {

@@ -14,7 +14,7 @@ use crate::refine::Pair;
 use crate::reflect::Senders;
 use crate::resume::Unfinished;
 use crate::solution::Solution;
-use crate::solver::{PASSES, scene_data};
+use crate::solver::scene_data;
 use crate::stats::{Seconds, Skipped, Stats};
 use crate::transport::Exitant;
 use crate::{Rgb, SceneInput, SolveError};
@@ -243,19 +243,18 @@ fn restore_links(nodes: usize, from: &mut Reader<'_>) -> Result<Links, FlatError
 
 impl Unfinished {
     fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
-        out.put(&[self.passes])?;
-        out.put(&[self.error])?;
+        out.put(&[self.tolerance, self.found])?;
         out.put(&self.unlit)?;
         out.put(&self.coarse)
     }
 
     fn restore(nodes: usize, from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "pairs that are not done";
-        let ([passes], [error]) = (from.take_exactly(WHAT)?, from.take_exactly(WHAT)?);
-        let unfinished = Self { passes, error, unlit: from.take(WHAT)?, coarse: from.take(WHAT)? };
+        let [tolerance, found] = from.take_exactly(WHAT)?;
+        let unfinished = Self { tolerance, found, unlit: from.take(WHAT)?, coarse: from.take(WHAT)? };
         let is_sound = |pair: &Pair| (pair.receiver as usize) < nodes && (pair.sender as usize) < nodes;
         let pairs = unfinished.unlit.iter().chain(&unfinished.coarse).all(is_sound);
-        fits(pairs && passes as usize <= PASSES.len() && (0.001..=1.0).contains(&error), WHAT)?;
+        fits(pairs && tolerance > 0.0 && found >= 0.0, WHAT)?;
         Ok(unfinished)
     }
 }
@@ -314,6 +313,8 @@ impl Stats {
             pairs,
             iterations,
             ref residuals,
+            error,
+            bias,
             stopped,
             spent,
             bytes,
@@ -337,7 +338,9 @@ impl Stats {
         out.put(&[polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations.into(), bytes])?;
         out.put(&[stopped.into(), spent])?;
         out.put(&[black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves, faint_links])?;
-        out.put(residuals)
+        out.put(residuals)?;
+        out.put(error.as_slice())?;
+        out.put(&[bias])
     }
 
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
@@ -356,6 +359,8 @@ impl Stats {
             pairs,
             iterations: u64::try_into(iterations).map_err(|_| FlatError::Misfit(WHAT))?,
             residuals: from.take(WHAT)?,
+            error: from.take_finite(WHAT)?.first().copied(),
+            bias: from.take_exactly::<f32, 1>(WHAT)?[0],
             stopped: stopped != 0,
             spent: match spent {
                 0 => None,

@@ -2,41 +2,52 @@
 //! nowhere to more, so that light dies out wherever reflectances are below 1.
 
 use crate::Rgb;
+use crate::gather::GROUPS;
 use crate::hierarchy::Kind;
 use crate::hooks::LightField;
-use crate::rows::MOST_RAISE;
 use crate::sampling::{cosine_direction, hash, point2};
 use crate::threads::prelude::*;
 use crate::transport::Light;
 
+/// Relative uncertainty of what arrives from emitters, through other links that leaves look at, and through those that they do
+/// not look at.
+const UNCERTAIN: [f32; 3] = [0.02, 0.1, 0.5];
+/// No light is raised by more than this: where more is missing, it is not known from where.
+const MOST_RAISE: f32 = 3.0;
+
+/// No leaf sees more than all there is, but its few rays may say so: a sum is cut off above this. Cut off at 1, what errs to
+/// the other side would be left alone, and light be lost; so it is the mean over a side of a surface that is kept below 1.
+const MOST_SEEN: f32 = 1.2;
+
 /// Sums of form factors times visibility of a leaf, by which its light is balanced.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct LeafRow {
-    /// Of emitters, and of other surfaces.
-    pub(crate) shares: [f32; 2],
+struct LeafRow {
+    /// Of emitters, of other links that leaves look at, and of faint ones.
+    shares: [f32; 3],
     /// Share of the leaf that light may reach.
-    pub(crate) exposed: f32,
-    /// Whether all that is seen from the leaf sends light.
-    pub(crate) closed: bool,
+    exposed: f32,
 }
 
 impl LeafRow {
-    /// Factors for the light of [lights without extent, emitters, others] that make the row 1 where it is known to be, and no
-    /// more than what is exposed elsewhere; the exposed part gets all of it. Others change first, as links to emitters are
-    /// fine.
-    pub(crate) fn factors(&self) -> [f32; 3] {
-        let [emitters, rest] = self.shares;
+    fn sum(&self) -> f32 {
+        self.shares.iter().sum()
+    }
+
+    /// Factors for the light of [lights without extent, and of each of the shares] that make the row's sum what it is to be; the
+    /// exposed part gets all of it. What is off is put down to each share by its uncertainty, as least squares do.
+    fn factors(&self, sum: f32) -> [f32; GROUPS] {
         if self.exposed <= 0.0 {
-            return [0.0; 3];
+            return [0.0; GROUPS];
         }
-        if self.closed && self.exposed >= 1.0 {
-            let more = if rest > 0.0 { ((1.0 - emitters).max(0.0) / rest).min(MOST_RAISE) } else { 1.0 };
-            let all = (emitters + rest * more).max(MOST_RAISE.recip()).recip();
-            return [1.0, all, all * more];
-        }
-        let limited = |share: f32, most: f32| (most.max(0.0) / share.max(f32::MIN_POSITIVE)).min(1.0);
-        let (all, rest) = (limited(emitters, self.exposed), limited(rest, self.exposed - emitters));
-        [1.0, all, rest].map(|factor| factor / self.exposed)
+        let off = sum - self.sum();
+        let variance = |i: usize| (UNCERTAIN[i] * self.shares[i]).powi(2);
+        let all: f32 = (0..3).map(variance).sum();
+        let balanced = |i: usize| 1.0 + off * variance(i) / (all * self.shares[i]).max(f32::MIN_POSITIVE);
+        let factors: [f32; 3] = std::array::from_fn(|i| balanced(i).clamp(MOST_RAISE.recip(), MOST_RAISE));
+        let now: f32 = factors.iter().zip(self.shares).map(|(factor, share)| factor * share).sum();
+        let most = (sum / now.max(f32::MIN_POSITIVE)).min(1.0);
+        let [emitters, rest, faint] = factors.map(|factor| factor * most / self.exposed);
+        [self.exposed.recip(), emitters, rest, faint]
     }
 }
 
@@ -45,27 +56,48 @@ const CLOSED_RAYS: u32 = 32;
 /// … and so many for each leaf.
 const CLOSED_RAYS_PER_LEAF: u32 = 4;
 
-/// For each leaf, whether all that is seen from its side of its surface sends light: then its form factors sum to 1. As
-/// many rays as are shot miss an opening only if it hardly counts.
-pub(crate) fn closed<L: LightField>(light: Light<'_, L>, leaves: &[u32]) -> Vec<bool> {
+/// By leaf, the factors for the light of each group that balance its row, by the shares of all but the first; for nothing but the
+/// limits where nobody is to `look`. Rows are 1 where all that is seen from a side of a surface sends light: as many rays as
+/// are shot miss an opening only if it hardly counts.
+pub(crate) fn balance<L: LightField>(
+    light: Light<'_, L>,
+    leaves: &[u32],
+    shares: &[[f32; GROUPS - 1]],
+    look: bool,
+) -> Vec<[f32; GROUPS]> {
     let side = |leaf: u32| (light.element(leaf).source, light.element(leaf).kind == Kind::Back);
     let mut order: Vec<u32> = (0..leaves.len() as u32).collect();
     order.sort_by_key(|&index| side(leaves[index as usize]));
-    let groups: Vec<&[u32]> = order.chunk_by(|&a, &b| side(leaves[a as usize]) == side(leaves[b as usize])).collect();
-    let of_group = |group: &&[u32]| {
-        let rays = CLOSED_RAYS_PER_LEAF.max(CLOSED_RAYS / group.len() as u32);
-        let lit = group.iter().map(|&index| leaves[index as usize]);
-        lit.filter(|&leaf| light.exitant.irradiance[leaf as usize] != Rgb::ZERO)
-            .all(|leaf| (0..rays).all(|ray| sees_sender(light, leaf, ray)))
-    };
-    let decided: Vec<bool> = groups.par_iter().with_min_len(4).map(of_group).collect();
-    let mut closed = vec![false; leaves.len()];
-    for (group, is_closed) in groups.into_iter().zip(decided) {
-        for &index in group {
-            closed[index as usize] = is_closed;
+    let sides: Vec<&[u32]> = order.chunk_by(|&a, &b| side(leaves[a as usize]) == side(leaves[b as usize])).collect();
+    let of_side = |side: &&[u32]| {
+        let leaf = |index: u32| leaves[index as usize];
+        let row = |index: u32| LeafRow { shares: shares[index as usize], exposed: light.elements.exposed(leaf(index)) };
+        let rays = CLOSED_RAYS_PER_LEAF.max(CLOSED_RAYS / side.len() as u32);
+        let is_lit = |index: &u32| light.exitant.irradiance[leaf(*index) as usize] != Rgb::ZERO;
+        let sees_senders = |&index: &u32| (0..rays).all(|ray| sees_sender(light, leaf(index), ray));
+        let closed = look && side.iter().filter(|index| is_lit(index)).all(sees_senders);
+        let (mut area, mut sum) = (0.0, 0.0);
+        for &index in side.iter().filter(|&&index| row(index).exposed >= 1.0) {
+            area += light.element(leaf(index)).area;
+            sum += light.element(leaf(index)).area * row(index).sum();
         }
+        let most = if sum > area { area / sum } else { 1.0 };
+        let factors = |&index: &u32| {
+            let row = row(index);
+            row.factors(match row.exposed >= 1.0 {
+                true if closed => 1.0,
+                true => (most * row.sum()).min(MOST_SEEN),
+                false => row.sum().min(row.exposed),
+            })
+        };
+        side.iter().map(factors).collect::<Vec<_>>()
+    };
+    let balanced: Vec<Vec<[f32; GROUPS]>> = sides.par_iter().with_min_len(4).map(of_side).collect();
+    let mut factors = vec![[0.0; GROUPS]; leaves.len()];
+    for (&index, balanced) in order.iter().zip(balanced.into_iter().flatten()) {
+        factors[index as usize] = balanced;
     }
-    closed
+    factors
 }
 
 /// Whether a random ray from a leaf meets something that sends light.
@@ -84,30 +116,38 @@ fn sees_sender<L: LightField>(light: Light<'_, L>, leaf: u32, ray: u32) -> bool 
 mod tests {
     use super::*;
 
-    fn factors(shares: [f32; 2], exposed: f32, closed: bool) -> [f32; 3] {
-        LeafRow { shares, exposed, closed }.factors()
+    fn sum(shares: [f32; 3], factors: [f32; GROUPS]) -> f32 {
+        shares.iter().zip(&factors[1..]).map(|(share, factor)| share * factor).sum()
     }
 
     #[test]
-    fn rows_of_enclosures_are_filled_and_no_others() {
-        assert_eq!(factors([0.2, 0.5], 1.0, false), [1.0; 3], "there may be sky");
-        let [lights, emitters, rest] = factors([0.2, 0.64], 1.0, true);
-        assert!((0.2 * emitters + 0.64 * rest - 1.0).abs() < 1e-6, "all there is to see: {emitters}, {rest}");
-        assert!(lights == 1.0 && (emitters - 1.0).abs() < 1e-6, "links to emitters are fine: {emitters}");
-        let [_, emitters, rest] = factors([0.9, 0.0], 1.0, true);
+    fn what_is_uncertain_changes_first() {
+        let factors = |shares, sum| LeafRow { shares, exposed: 1.0 }.factors(sum);
+        let row = [0.2, 0.5, 0.2];
+        assert_eq!(factors(row, 0.9), [1.0; GROUPS], "it is what it should be");
+        let all @ [lights, emitters, rest, faint] = factors(row, 1.0);
+        assert!((sum(row, all) - 1.0).abs() < 1e-6, "all there is to see: {all:?}");
+        assert!(lights == 1.0 && (emitters - 1.0).abs() < 0.01, "links to emitters are fine: {emitters}");
+        assert!(faint - 1.0 > 5.0 * (rest - 1.0) && rest > 1.0, "what is looked at is known better: {rest}, {faint}");
+        let [_, emitters, rest, _] = factors([0.9, 0.0, 0.0], 1.0);
         assert!((emitters * 0.9 - 1.0).abs() < 1e-6 && rest.is_finite(), "nothing else could be what is missing");
+        let [.., faint] = factors([0.1, 0.1, 0.01], 1.0);
+        assert!(faint <= MOST_RAISE, "so much may be missing elsewhere: {faint}");
     }
 
     #[test]
-    fn rows_never_exceed_what_is_open() {
+    fn rows_never_exceed_what_they_are_to_be() {
         for exposed in [0.0, 0.5, 1.0] {
-            for closed in [false, true] {
+            for most in [0.0, 0.3, 1.0] {
                 for emitters in [0.0, 1e-30, 0.3, 1.0, 7.0] {
                     for rest in [0.0, 1e-30, 0.4, 1.0, 9.0] {
-                        let [lights, all, others] = factors([emitters, rest], exposed, closed);
-                        let sum = emitters * all + rest * others;
-                        assert!((0.0..=1.000_001).contains(&sum), "{emitters}, {rest}, {exposed}, {closed}: {sum}");
-                        assert!(lights.is_finite() && lights >= 0.0, "{lights}");
+                        for faint in [0.0, 1e-20, 0.1, 2.0] {
+                            let row = [emitters, rest, faint];
+                            let all = LeafRow { shares: row, exposed }.factors(most);
+                            let sum = sum(row, all) * if exposed > 0.0 { exposed } else { 1.0 };
+                            assert!((0.0..=most + 1e-6).contains(&sum), "{row:?}, {exposed}, {most}: {sum}");
+                            assert!(all.iter().all(|f| f.is_finite() && *f >= 0.0), "{row:?}: {all:?}");
+                        }
                     }
                 }
             }

@@ -32,6 +32,7 @@ pub mod reconstruct;
 mod refine;
 pub mod reflect;
 pub mod relight;
+mod residual;
 mod resume;
 mod rows;
 pub mod sampling;

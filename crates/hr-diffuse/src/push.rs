@@ -6,7 +6,7 @@
 //! next to nothing are spread evenly over flat nodes, and by orientation and distance alone over others.
 
 use crate::NodeId;
-use crate::gather::Group;
+use crate::gather::{GROUPS, Group};
 use crate::hierarchy::{Element, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
 use crate::links::{Link, Links};
@@ -20,8 +20,11 @@ use std::ops::ControlFlow;
 /// No more weights than these are kept: 256 MB. In larger scenes the leaves beyond have weights by orientation and distance
 /// alone, which are found anew in each iteration.
 const MOST_KEPT: usize = 1 << 26;
-/// Links that bring less than this share of the error asked for, relative to all that arrives, are not looked at closely.
-const FAINT_SHARE: f32 = 0.03;
+/// Links that bring less than this share of all that arrives, times the square root of the tolerance, are not looked at closely.
+const FAINT_SHARE: f32 = 0.003;
+/// Leaves look for themselves at links of their own that bring more than this share of their light: others let so much through as
+/// their segments found.
+const OWN_SHARE: f32 = 0.02;
 /// Leaves and senders whose radii together are below this share of their distance are far from each other.
 const FAR: f32 = 0.25;
 /// Leaves get no more than this times what a link brings on average. Surfaces that lie in one another's plane hide each
@@ -177,8 +180,8 @@ impl Push {
         light: Light<'_, L>,
         links: &Links,
         index: usize,
-        (groups, arriving, even): (&[Group], &[T], &[[T; 3]]),
-    ) -> [T; 3] {
+        (groups, arriving, even): (&[Group], &[T], &[[T; GROUPS]]),
+    ) -> [T; GROUPS] {
         let leaf = self.leaves[index];
         let mut sums = even[leaf as usize];
         let Some(range) = self.first.get(index..index + 2) else {
@@ -208,7 +211,7 @@ impl Push {
 
 /// Whether what a node received means different things to its leaves, or to parts of it: not where a link's factor is the mean
 /// over the leaf itself.
-fn is_shared<L: LightField>(light: Light<'_, L>, node: u32) -> bool {
+pub(crate) fn is_shared<L: LightField>(light: Light<'_, L>, node: u32) -> bool {
     let element = light.element(node);
     !element.is_flat() || element.child_count > 0
 }
@@ -217,11 +220,17 @@ fn is_shared<L: LightField>(light: Light<'_, L>, node: u32) -> bool {
 fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -> (Spread, f32) {
     let receiver = light.element(link.receiver);
     let even = if receiver.is_flat() || link.visibility == 0.0 { Spread::Even } else { Spread::Plain };
-    let Some(error) = error.filter(|_| is_shared(light, link.receiver)) else { return (even, 0.0) };
+    let Some(error) = error else { return (even, 0.0) };
     let direction = light.direction_to(receiver.center, link.sender);
     let mean = light.emitted(link.sender, -direction).element_sum() * link.factor;
-    let faint = FAINT_SHARE * error * light.exitant.irradiance[link.receiver as usize].element_sum();
-    let closely = mean > 0.0 && mean * visible(link, Spread::Exact) >= faint;
+    let least = match is_shared(light, link.receiver) {
+        true => FAINT_SHARE * error.sqrt(),
+        false if link.visibility >= 0.0 => OWN_SHARE,
+        // Nothing is left to be found out.
+        false => f32::INFINITY,
+    };
+    let irradiance = light.exitant.irradiance[link.receiver as usize].element_sum();
+    let closely = mean > 0.0 && mean * visible(link, Spread::Exact) >= least * irradiance;
     (if closely { Spread::Exact } else { even }, mean)
 }
 
@@ -240,7 +249,7 @@ impl Place {
         let points = sample_points(light.scene, light.element(leaf));
         let irradiance = light.exitant.irradiance[leaf as usize];
         let negligible = NEGLIGIBLE * irradiance.max_element();
-        Self { leaf, points, negligible, faint: FAINT_SHARE * error * irradiance.element_sum() }
+        Self { leaf, points, negligible, faint: FAINT_SHARE * error.sqrt() * irradiance.element_sum() }
     }
 
     /// What a link brings to the leaf over what it brings to its receiver, by orientation and distance alone.
@@ -275,7 +284,9 @@ impl Place {
         if far && mean * visible * self.turned(light, link) < self.faint {
             return (self.plain(light, link, spread), 0);
         }
-        let here = if element.is_flat() || !far {
+        let here = if !is_shared(light, link.receiver) {
+            mean
+        } else if element.is_flat() || !far {
             let at = |&(x, n, weight): &(Vec3, Vec3, f32)| {
                 weight * light.arriving_at(x, n, link.sender, self.negligible).0.element_sum()
             };

@@ -24,7 +24,7 @@ use std::time::Instant;
 
 /// Share of the oracle's interval that counts as error where it stems from geometry: the transported value is an
 /// average over the interval, and display renews the geometry per vertex.
-const GEOMETRY_SHARE: f32 = 0.25;
+const GEOMETRY_SHARE: f32 = 0.12;
 /// The same where it stems from the sender's uneven radiosity.
 const RADIOSITY_SHARE: f32 = 0.5;
 /// The same where it stems from the sender's directional distribution: of the directions that lead to a receiver few
@@ -399,8 +399,14 @@ fn decide<L: LightField>(
             return verdict;
         }
     }
+    // What visibility is worth: rays in proportion to the light at stake, and a split where it is uneven.
+    let stake = |link: &Link| weight * interval.most.min(4.0 * estimate(light, link));
+    let split_by_shadow = |link: &Link| {
+        let partial = link.visibility > 0.0 && link.visibility < 1.0;
+        if partial && stake(link) > tolerance.error { split(choose(light, pair, tolerance, false)) } else { None }
+    };
     if let Some(link) = old {
-        return Verdict::Keep(link);
+        return split_by_shadow(&link).unwrap_or(Verdict::Keep(link));
     }
     // A faint link's factor need not be accurate; no later pass renews it.
     let relative = (FACTOR_SHARE * tolerance.error / (weight * interval.most).max(f32::MIN_POSITIVE))
@@ -416,34 +422,21 @@ fn decide<L: LightField>(
         link.visibility = 1.0;
         return Verdict::Keep(link);
     }
-    // What visibility is worth: rays in proportion to the light at stake, and a split where it is uneven.
-    let stake = weight * interval.most.min(4.0 * estimate(light, &link));
     let near = 2.0 * (r.radius + s.radius) > r.center.distance(s.center);
     let first = if near { NEAR_SEGMENTS } else { FIRST_SEGMENTS };
-    let start = Instant::now();
-    let mut blocker = u32::MAX;
-    let (mut seen, mut total, mut rays) =
-        segments::visibility(light, pair.receiver, pair.sender, 0..first, &mut blocker);
-    let worth = (first as f32 * stake / tolerance.error) as u32;
-    let partial = seen > 0.0 && seen < total;
-    if !(partial && stake > tolerance.error && !stopped) {
-        let more = worth.clamp(first, MOST_SEGMENTS);
-        if more > first {
-            let (a, b, c) = segments::visibility(light, pair.receiver, pair.sender, first..more, &mut blocker);
-            seen += a;
-            total += b;
-            rays += c;
+    let worth = (first as f32 * stake(&link) / tolerance.error) as u32;
+    let (mut blocker, mut seen, mut total, mut done) = (u32::MAX, 0.0, 0.0, 0);
+    // A few at first: those of a pair that is split then are not missed.
+    for segments in [first, worth.clamp(first, MOST_SEGMENTS)] {
+        let start = Instant::now();
+        let (free, all, rays) = segments::visibility(light, pair.receiver, pair.sender, done..segments, &mut blocker);
+        counters.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
+        counters.nanoseconds.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        (seen, total, done) = (seen + free, total + all, segments);
+        link.visibility = if total > 0.0 { (seen / total).min(1.0) } else { 0.0 };
+        if let Some(verdict) = split_by_shadow(&link) {
+            return verdict;
         }
-    }
-    counters.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
-    counters.nanoseconds.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
-    link.visibility = if total > 0.0 { (seen / total).min(1.0) } else { 0.0 };
-    let partial = seen > 0.0 && seen < total;
-    if partial
-        && stake > tolerance.error
-        && let Some(verdict) = split(choose(light, pair, tolerance, false))
-    {
-        return verdict;
     }
     Verdict::Keep(link)
 }

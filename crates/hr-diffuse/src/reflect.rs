@@ -245,7 +245,7 @@ impl<L: LightField> Solver<L> {
         for Standing { leaf, .. } in &leaves {
             self.last_reflected[*leaf as usize] = Rgb::splat(f32::NEG_INFINITY);
         }
-        let progress = self.progress(Phase::Transport, 0.86, 1.0);
+        let progress = self.progress(Phase::Transport, 0.9);
         let (mut done, mut stopped) = (0, false);
         let chunk = BETWEEN_WATCHES * threads::current_num_threads();
         self.reflect(&leaves, &mut || {

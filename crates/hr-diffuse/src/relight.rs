@@ -10,7 +10,7 @@
 use crate::error::SolveError;
 use crate::hierarchy::Elements;
 use crate::hooks::LightField;
-use crate::solver::{FIRST_REFLECTED, LAST_PASS, Progress, Solver, check, unit_lights};
+use crate::solver::{Progress, Solver, check, unit_lights};
 use crate::transport::Exitant;
 use crate::{Light, LightKind, Rgb, SceneInput};
 use std::ops::ControlFlow;
@@ -239,14 +239,10 @@ impl<L: LightField> Solver<L> {
         let mut stopped = false;
         self.pull();
         if self.stats.iterations > 0 {
-            self.prepare_again(&mut stopped, watch);
             self.stats.residuals.clear();
+            self.stats.error = None;
             self.restart();
-            if self.elements.nodes[0].active {
-                // Light is reflected by the extension when most of it is there: that is what takes time.
-                self.settle(FIRST_REFLECTED - 1, &mut stopped, watch);
-            }
-            self.settle(LAST_PASS, &mut stopped, watch);
+            self.settle_again(&mut stopped, watch);
         }
         self.stats.stopped = stopped;
     }

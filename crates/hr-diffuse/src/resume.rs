@@ -9,16 +9,30 @@ use crate::hooks::LightField;
 use crate::links::Links;
 use crate::refine::Pair;
 use crate::solution::Solution;
-use crate::solver::{PASSES, Settings, Solver};
+use crate::solver::{Settings, Solver};
 use std::collections::HashSet;
 
+/// Tolerances of the links of the first passes, over the error asked for: nothing is refined for light that is not there yet. The
+/// last of them is the first that leaves look closely in.
+const FIRST: [f32; 3] = [16.0, 8.0, 4.0];
+/// At least this step is between them.
+const HALF: f32 = 0.5;
+/// A solution is fine enough if its error was found to be below this share of what was asked for: what was found is uncertain.
+const ACCEPTED: f32 = 0.8;
+/// The next pass aims at this share, …
+const AIM: f32 = 0.6;
+/// … as if the error shrank with the square root of the tolerance, which is halved at least once and so many times at most, …
+const MOST_HALVES: f32 = 3.0;
+/// … down to this tolerance over the error asked for: where more error is left it does not come from links that are too coarse.
+const FINEST: f32 = 0.25;
+
 /// What is left to be done of a solution.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Unfinished {
-    /// Passes that are done …
-    pub(crate) passes: u32,
-    /// … for this error.
-    pub(crate) error: f32,
+    /// Tolerance that the links there are were made for; infinite before the first pass is done.
+    pub(crate) tolerance: f32,
+    /// The relative error that was found then; infinite where nobody has looked.
+    pub(crate) found: f32,
     /// Pairs without a link, whose sender was dark.
     pub(crate) unlit: Vec<Pair>,
     /// Pairs whose link is that of a larger one.
@@ -26,12 +40,24 @@ pub(crate) struct Unfinished {
 }
 
 impl Unfinished {
-    /// Aims at another error: passes that are fine enough for it are done.
-    fn go_for(&mut self, error: f32) {
-        // The error of the last pass that is done.
-        let done = self.passes.checked_sub(1).map_or(f32::INFINITY, |last| PASSES[last as usize] * self.error);
-        self.passes = PASSES.iter().filter(|&&looseness| looseness * error >= done).count() as u32;
-        self.error = error;
+    /// Nothing is done.
+    pub(crate) const fn new(unlit: Vec<Pair>) -> Self {
+        Self { tolerance: f32::INFINITY, found: f32::INFINITY, unlit, coarse: Vec::new() }
+    }
+
+    /// The tolerance of the next pass toward a relative error; `None` where nothing is left to be done.
+    pub(crate) fn next(&self, error: f32) -> Option<f32> {
+        let firsts = first_tolerances(error);
+        if let Some(&tolerance) = firsts.iter().find(|&&tolerance| tolerance < self.tolerance)
+            && self.found.is_infinite()
+        {
+            return Some(tolerance);
+        }
+        let done = self.found <= ACCEPTED * error || self.tolerance <= FINEST * error;
+        // Whole halves, so that what rays happen to find seldom makes another solution.
+        let halves = (2.0 * (self.found / (AIM * error)).log2()).round().clamp(1.0, MOST_HALVES);
+        let halves = if self.found.is_finite() { halves } else { 1.0 };
+        (!done).then(|| (self.tolerance * HALF.powf(halves)).max(FINEST * error))
     }
 
     /// Looks at pairs with a coarse link as if they had none.
@@ -48,6 +74,21 @@ impl Unfinished {
     }
 }
 
+/// Tolerances of the first passes toward an error.
+fn first_tolerances(error: f32) -> [f32; 3] {
+    let mut most = 1.0;
+    FIRST.map(|share| {
+        let tolerance = (share * error).min(most);
+        most = tolerance * HALF;
+        tolerance
+    })
+}
+
+/// Whether leaves look closely in a pass of this tolerance: not before most of the light is there.
+pub(crate) fn is_close(tolerance: f32, error: f32) -> bool {
+    tolerance <= first_tolerances(error)[2]
+}
+
 impl<L: LightField> Solver<L> {
     /// Goes on with a solution, to an error that may be smaller than the one asked for before. [`Solver::solve`] does the
     /// rest; where nothing is left to be done, it does nothing.
@@ -55,12 +96,11 @@ impl<L: LightField> Solver<L> {
     /// # Errors
     /// [`SolveError::Error`] for an error out of range.
     pub fn resume(solution: Solution<L>, settings: Settings) -> Result<Self, SolveError> {
-        let Solution { scene, elements, exitant, links, field, incident, reflected, mut stats, mut unfinished, .. } =
+        let Solution { scene, elements, exitant, links, field, incident, reflected, mut stats, unfinished, .. } =
             solution;
         stats.stopped = false;
         stats.spent = None;
         settings.check()?;
-        unfinished.go_for(settings.error);
         let mut solver = Self::with_light(scene, elements, exitant, (field, incident, reflected), settings);
         (solver.links, solver.stats, solver.unfinished) = (links, stats, unfinished);
         Ok(solver)

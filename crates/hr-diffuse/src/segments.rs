@@ -139,7 +139,7 @@ fn draw_part(geometry: &Geometry, element: &Element, from: Vec3, mut choice: f32
 
 /// Picks one of several by their weights, which sum to `total`, with a number in 0…1; returns what is left of the number,
 /// scaled to 0…1 again. `None` where all weights are 0.
-fn pick(weights: impl Iterator<Item = f32>, choice: f32, total: f32) -> Option<(usize, f32)> {
+pub(crate) fn pick(weights: impl Iterator<Item = f32>, choice: f32, total: f32) -> Option<(usize, f32)> {
     let mut rest = choice * total;
     let mut picked = None;
     for (i, weight) in weights.enumerate() {

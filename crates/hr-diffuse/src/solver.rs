@@ -13,7 +13,8 @@ use crate::links::Links;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
 use crate::relight::Linked;
-use crate::resume::Unfinished;
+use crate::residual::{RAYS_PER_LEAF, residual};
+use crate::resume::{Unfinished, is_close};
 use crate::skips::Skips;
 use crate::stats::Stats;
 use crate::steady;
@@ -25,24 +26,23 @@ use glam::DVec3;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-/// A link's tolerance is this share of the error asked for, times the mean irradiance. Chosen so that the error of
-/// the built-in scenes stays below what was asked for.
+/// A link may be wrong by this share of a pass's tolerance, times the mean irradiance.
 const LINK_SHARE: f32 = 0.07;
-/// Elements are not split below this share of the error's square root: features smaller than that are not resolved.
+/// Elements are not split below this share of the tolerance's square root: features smaller than that are not resolved.
 const SMALLEST_SHARE: f32 = 0.008;
-/// Tolerances of successive passes, relative to the last: nothing is refined for light that is not there yet.
-pub(crate) const PASSES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
-/// Index of the last of them.
-pub(crate) const LAST_PASS: usize = PASSES.len() - 1;
 /// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
 /// diffuse light until it is shown.
 const FAINT_SHARE: f32 = 0.7;
 /// Iterations end when all that are to come would change the solution by less than this share of the error.
 const CONVERGED_SHARE: f32 = 0.02;
-/// The first pass that reflects the extension's light: before it, there is little light to reflect.
-pub(crate) const FIRST_REFLECTED: usize = 2;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
+/// So many where light need only be there roughly.
+const FEW_ITERATIONS: u32 = 3;
+/// This share of the rays shot so far is worth knowing what the solution is off by, …
+const CHECK_SHARE: f32 = 0.1;
+/// … from at least and at most so many leaves.
+const CHECKED_LEAVES: [u64; 2] = [64, 2000];
 
 /// Exitances and intensities above this are refused: sums of powers and what white surfaces make of them would leave the
 /// range of f32.
@@ -100,7 +100,7 @@ pub struct Progress {
     pub phase: Phase,
     /// Rough share of the work done, 0…1.
     pub fraction: f32,
-    /// Relative error that the solution is believed to have now.
+    /// Relative error that the solution is believed to have now: once rays have looked, what they found.
     pub error: f32,
     /// Links so far.
     pub links: u64,
@@ -179,8 +179,7 @@ impl<L: LightField> Solver<L> {
         let reflected = std::iter::repeat_with(L::Exitant::default).take(count).collect();
         let solver = Self::with_light(scene, elements, exitant, (field, incident, reflected), settings);
         let mut solver = Self { skips, account: Account::new(settings.budget, start), ..solver };
-        solver.unfinished =
-            Unfinished { error: settings.error, unlit: vec![Pair { receiver: 0, sender: 0 }], ..Unfinished::default() };
+        solver.unfinished = Unfinished::new(vec![Pair { receiver: 0, sender: 0 }]);
         solver.stats.polygons = input.surfaces.len() as u64;
         solver.pull();
         solver.stats.skipped.sealed_sides = solver.elements.sealed_sides();
@@ -210,7 +209,7 @@ impl<L: LightField> Solver<L> {
             stats: Stats::default(),
             account: Account::new(settings.budget, Instant::now()),
             skips: Skips::ALL,
-            unfinished: Unfinished::default(),
+            unfinished: Unfinished::new(Vec::new()),
             gather: Gather::default(),
             prepared: false,
             linked: Linked::default(),
@@ -232,25 +231,33 @@ impl<L: LightField> Solver<L> {
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
         self.unfinished.renew(&mut self.links, self.elements.nodes.len());
-        for (pass, looseness) in PASSES.iter().enumerate().skip(self.unfinished.passes as usize) {
-            self.refine(pass, *looseness, &mut stopped, watch);
+        let mut number = 0;
+        while let Some(tolerance) = self.unfinished.next(self.settings.error) {
+            let pass = Pass { number, tolerance, closely: is_close(tolerance, self.settings.error) };
+            self.refine(pass, &mut stopped, watch);
             if stopped {
                 // New elements have their parents' light.
                 break;
             }
+            // Once a budget is spent there is no later pass to look closely in.
+            let last = Pass { closely: true, tolerance: self.settings.error, ..pass };
+            let pass = if self.stats.spent.is_some() { last } else { pass };
             self.prepare_watched(pass, &mut stopped, watch);
             self.settle(pass, &mut stopped, watch);
+            if pass.closely && !stopped {
+                self.check(pass, &mut stopped, watch);
+            }
             self.measure();
-            if stopped {
+            if stopped || self.stats.spent.is_some() {
                 break;
             }
-            if self.stats.spent.is_none() {
-                self.unfinished.passes = pass as u32 + 1;
-            }
+            self.unfinished.tolerance = tolerance;
+            self.unfinished.found = self.stats.error.unwrap_or(f32::INFINITY);
+            number += 1;
         }
         if self.stats.iterations == 0 {
             // Whenever it was stopped, there is some light.
-            self.prepare(false, &mut || ControlFlow::Continue(()));
+            self.prepare(None, &mut || ControlFlow::Continue(()));
             self.iterate(false, &mut || ControlFlow::Continue(()));
         }
         self.measure();
@@ -261,53 +268,79 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Finds out how the light of the links of a pass reaches leaves.
-    fn prepare_watched(
-        &mut self,
-        pass: usize,
-        stopped: &mut bool,
-        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-    ) {
+    fn prepare_watched(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let account = self.account;
-        let progress = self.progress(Phase::Transport, progress_fraction(pass, 0.8), PASSES[pass]);
-        self.prepare(pass == LAST_PASS, &mut || {
+        let progress = self.progress(Phase::Transport, pass.fraction(0.6));
+        self.prepare(pass.closely.then_some(pass.tolerance), &mut || {
             *stopped = *stopped || watch(&progress).is_break();
             if *stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
     }
 
-    /// The same where links have changed since, for the last pass.
-    pub(crate) fn prepare_again(&mut self, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+    /// Lets light settle anew over the links that there are, for which it is found out how they reach leaves where it is not
+    /// known yet.
+    pub(crate) fn settle_again(&mut self, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        let pass = Pass { number: 1, tolerance: self.unfinished.tolerance.min(1.0), closely: true };
         if !self.prepared {
-            self.prepare_watched(LAST_PASS, stopped, watch);
+            self.prepare_watched(pass, stopped, watch);
         }
+        self.settle(pass, stopped, watch);
     }
 
     /// Iterates until light has settled, as far as a pass needs it.
-    pub(crate) fn settle(
+    fn settle(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        // The extension's light is reflected when most of it is there: that is what takes time.
+        if !pass.closely || self.elements.nodes[0].active {
+            self.iterate_until(pass, (FEW_ITERATIONS, 1.0, false), stopped, watch);
+        }
+        if pass.closely && !*stopped {
+            self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, true), stopped, watch);
+        }
+    }
+
+    /// Iterates, so many times at most, until what is to come is below a share of the error, with or without the extension's light.
+    fn iterate_until(
         &mut self,
-        pass: usize,
+        pass: Pass,
+        (most, share, reflects): (u32, f32, bool),
         stopped: &mut bool,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) {
-        let last = pass == LAST_PASS;
-        let goal = if last { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
         let account = self.account;
-        for iteration in 0..if last { MOST_ITERATIONS } else { 3 } {
-            let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
-            let progress = self.progress(Phase::Transport, fraction, PASSES[pass]);
+        for iteration in 0..most {
+            let fraction = pass.fraction(0.6 + 0.3 * (iteration as f32 / (iteration as f32 + 4.0)));
+            let progress = self.progress(Phase::Transport, fraction);
             let ask = &mut || {
                 *stopped = *stopped || watch(&progress).is_break();
                 if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
-            let Some(residual) = self.iterate(pass >= FIRST_REFLECTED, ask) else { break };
+            let Some(residual) = self.iterate(reflects, ask) else { break };
             if self.grows() {
                 self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
             }
-            let settled = self.remaining(residual) < goal && iteration > 0;
+            let settled = self.remaining(residual) < share * self.settings.error && iteration > 0;
             if *stopped || settled || account.is_over() {
                 break;
             }
         }
+    }
+
+    /// Finds what the solution is off by.
+    fn check(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        let start = Instant::now();
+        let [least, most] = CHECKED_LEAVES;
+        let count = (CHECK_SHARE * self.stats.rays as f32 / RAYS_PER_LEAF as f32) as u64;
+        let progress = self.progress(Phase::Transport, pass.fraction(0.9));
+        let residual = residual(self.light(), count.clamp(least, most) as usize, &mut || {
+            *stopped = *stopped || watch(&progress).is_break();
+            if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        if let Some(residual) = residual {
+            self.stats.error = Some(residual.error());
+            self.stats.bias = -residual.bias();
+            self.stats.rays += residual.rays;
+        }
+        self.stats.seconds.check += start.elapsed().as_secs_f64();
     }
 
     /// Begins a new series of iterations: the light is another one.
@@ -329,21 +362,17 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Refines all links to a tolerance.
-    fn refine(
-        &mut self,
-        pass: usize,
-        looseness: f32,
-        stopped: &mut bool,
-        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-    ) {
+    fn refine(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let start = Instant::now();
         let tolerance = Tolerance {
-            error: LINK_SHARE * self.settings.error * looseness * self.mean_irradiance(),
+            error: LINK_SHARE * pass.tolerance * self.mean_irradiance(),
             area: self.area,
-            smallest: SMALLEST_SHARE * self.settings.error.sqrt(),
+            smallest: SMALLEST_SHARE * pass.tolerance.sqrt(),
             skips: self.skips,
         };
-        let error = self.believed_error(looseness);
+        let error = self.believed_error();
+        // The links are about to be others.
+        self.stats.error = None;
         self.convergence.restart();
         let (links, unlit) = (self.links.take(), std::mem::take(&mut self.unfinished.unlit));
         let nodes = self.elements.nodes.len() as u64;
@@ -358,7 +387,7 @@ impl<L: LightField> Solver<L> {
         let mut wave_number = 0.0_f32;
         let refined = refine(&mut light, links, unlit, tolerance, &self.account, &mut |wave, done| {
             wave_number += 1.0;
-            let fraction = progress_fraction(pass, 0.8 * wave_number / (wave_number + 8.0));
+            let fraction = pass.fraction(0.6 * wave_number / (wave_number + 8.0));
             watch(&Progress { phase: Phase::Refine, fraction, error, links: wave + done, nodes })
         });
         *stopped |= refined.stopped;
@@ -438,14 +467,14 @@ impl<L: LightField> Solver<L> {
         }
     }
 
-    /// Finds out how the light of each link reaches the leaves below its receiver: by a look from each leaf itself once links
-    /// are as fine as they will be.
-    pub(crate) fn prepare(&mut self, closely: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) {
+    /// Finds out how the light of each link reaches the leaves below its receiver: where a tolerance is given, by a look from each
+    /// leaf itself.
+    pub(crate) fn prepare(&mut self, tolerance: Option<f32>, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         let start = Instant::now();
-        let error = closely.then_some(if self.skips.faint_links { self.settings.error } else { 0.0 });
+        let error = tolerance.map(|tolerance| if self.skips.faint_links { tolerance } else { 0.0 });
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
         self.gather = Gather::new(self.light(), &self.links, error, room, watch);
-        self.prepared = closely;
+        self.prepared = tolerance.is_some();
         self.stats.rays += self.gather.rays();
         self.stats.skipped.faint_links = self.gather.faint_links();
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
@@ -486,7 +515,7 @@ impl<L: LightField> Solver<L> {
                 continue;
             }
             let range = element.first_child as usize..(element.first_child + element.child_count) as usize;
-            let (mut radiosity, mut irradiance, mut area) = (Rgb::ZERO, Rgb::ZERO, 0.0);
+            let (mut radiosity, mut irradiance, mut area, mut reflecting) = (Rgb::ZERO, Rgb::ZERO, 0.0, 0.0);
             let mut directional = Rgb::ZERO;
             let (mut low, mut high) = (Rgb::MAX, Rgb::ZERO);
             let (mut facing, mut weight) = (Facing::ZERO, 0.0);
@@ -499,7 +528,10 @@ impl<L: LightField> Solver<L> {
                     continue;
                 }
                 radiosity += exitant.radiosity[child] * part.area;
-                irradiance += exitant.irradiance[child] * part.area;
+                if part.importance > 0.0 {
+                    irradiance += exitant.irradiance[child] * part.area;
+                    reflecting += part.area;
+                }
                 directional += exitant.directional[child] * part.area;
                 area += part.area;
                 low = low.min(exitant.range[child][0]);
@@ -510,7 +542,7 @@ impl<L: LightField> Solver<L> {
             }
             if area > 0.0 {
                 exitant.radiosity[node] = radiosity / area;
-                exitant.irradiance[node] = irradiance / area;
+                exitant.irradiance[node] = if reflecting > 0.0 { irradiance / reflecting } else { Rgb::ZERO };
                 exitant.directional[node] = directional / area;
                 exitant.range[node] = [low, high];
             }
@@ -555,16 +587,17 @@ impl<L: LightField> Solver<L> {
         self.convergence.remaining(residual, before)
     }
 
-    fn believed_error(&self, looseness: f32) -> f32 {
+    /// The error that was found last, or what can be said without a look.
+    fn believed_error(&self) -> f32 {
         let residual = self.stats.residuals.last().copied().unwrap_or(1.0);
-        (self.settings.error * looseness).hypot(residual).min(1.0)
+        self.stats.error.unwrap_or_else(|| self.unfinished.found.min(1.0).max(residual).min(1.0))
     }
 
-    pub(crate) fn progress(&self, phase: Phase, fraction: f32, looseness: f32) -> Progress {
+    pub(crate) fn progress(&self, phase: Phase, fraction: f32) -> Progress {
         Progress {
             phase,
             fraction,
-            error: self.believed_error(looseness),
+            error: self.believed_error(),
             links: self.links.all().len() as u64,
             nodes: self.elements.nodes.len() as u64,
         }
@@ -581,11 +614,25 @@ fn sorted<L: LightField>(field: &L, materials: usize, error: f32) -> (Vec<Rgb>, 
     (0..materials as u32).map(sort).unzip()
 }
 
-/// Share of the work done: each pass costs a few times the one before.
-fn progress_fraction(pass: usize, within: f32) -> f32 {
-    const SHARES: [f32; 5] = [0.0, 0.05, 0.15, 0.4, 0.9];
-    let pass = pass.min(SHARES.len() - 2);
-    SHARES[pass] + (SHARES[pass + 1] - SHARES[pass]) * within.clamp(0.0, 1.0)
+/// Links are refined to a tolerance, and light settles over them.
+#[derive(Clone, Copy, Debug)]
+struct Pass {
+    /// Passes before it.
+    number: usize,
+    /// Relative error that its links may have, if it all comes to the worst.
+    tolerance: f32,
+    /// Whether leaves look for themselves what arrives from where, and light settles.
+    closely: bool,
+}
+
+impl Pass {
+    /// Share of all the work that is done when so much of the pass is: most solves take four, and each costs a few times the one
+    /// before.
+    fn fraction(&self, within: f32) -> f32 {
+        const SHARES: [f32; 7] = [0.0, 0.05, 0.1, 0.4, 0.8, 0.87, 0.9];
+        let pass = self.number.min(SHARES.len() - 2);
+        SHARES[pass] + (SHARES[pass + 1] - SHARES[pass]) * within.clamp(0.0, 1.0)
+    }
 }
 
 /// Checks what can be checked of a scene without its geometry.

@@ -24,6 +24,11 @@ pub struct Stats {
     pub iterations: u32,
     /// Change of the mean radiosity by each iteration, relative to its value.
     pub residuals: Vec<f32>,
+    /// Relative L1 error of the leaves' irradiance, weighted by what they reflect, that rays have found; `None` where they did not
+    /// look: the solve was broken off.
+    pub error: Option<f32>,
+    /// The same with its sign: negative where light is missing.
+    pub bias: f32,
     /// Whether it was told to stop before it was done: the solution is what there was by then.
     pub stopped: bool,
     /// The budget that was spent before the solution had the error asked for: it is a coarser one.
@@ -82,6 +87,8 @@ pub struct Seconds {
     pub transport: f64,
     /// Reflection and pull of an extension's light.
     pub reflect: f64,
+    /// Rays that find out what the solution is off by.
+    pub check: f64,
     /// Values at vertices.
     pub reconstruct: f64,
 }

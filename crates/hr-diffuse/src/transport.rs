@@ -31,7 +31,7 @@ pub struct Exitant {
     pub range: Vec<[Rgb; 2]>,
     /// Normals below the node, weighted by area and radiosity: how a cluster's light is directed.
     pub facing: Vec<Facing>,
-    /// Mean irradiance on the node's surfaces, W/m².
+    /// Mean irradiance on those of the node's surfaces that reflect any light, W/m².
     pub irradiance: Vec<Rgb>,
     /// Mean radiant exitance as directional light, W/m².
     pub directional: Vec<Rgb>,
@@ -293,6 +293,21 @@ impl<L: LightField> Light<'_, L> {
             return -element.facing.mean;
         }
         (element.center - x).normalize_or(Vec3::Z)
+    }
+
+    /// Power emitted below each node, sum of channels, by lights with extent.
+    pub(crate) fn emitted_power(&self) -> Vec<f32> {
+        let nodes = &self.elements.nodes;
+        let mut power = vec![0.0; nodes.len()];
+        for (node, element) in nodes.iter().enumerate().rev() {
+            if element.child_count == 0 && element.kind == Kind::Front {
+                power[node] = self.scene.materials[element.material as usize].exitance.element_sum() * element.area;
+            }
+            if node > 0 {
+                power[element.parent as usize] += power[node];
+            }
+        }
+        power
     }
 
     /// The element hierarchy.

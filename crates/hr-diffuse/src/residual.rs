@@ -1,0 +1,271 @@
+//! The residual of the radiosity equation: how far a solution is from what it should be, found by rays that know nothing of
+//! its links.
+//!
+//! At random leaves the irradiance is gathered anew: over the hemisphere by rays that read the solution where they end, and
+//! from emitters by rays toward random points of them. The difference to the solution's own irradiance is what one bounce of
+//! light gets wrong (D. Lischinski, B. Smits, D. Greenberg, "Bounds and error estimates for radiosity", SIGGRAPH 1994,
+//! section 3). Each leaf is looked at twice: the two estimates' difference tells how much of it is the rays' own noise.
+
+use crate::hierarchy::Kind;
+use crate::hooks::LightField;
+use crate::sampling::{cosine_direction, hash, point4, unit};
+use crate::segments::{light_segment, pick};
+use crate::threads::{self, prelude::*};
+use crate::transport::Light;
+use crate::visibility::NO_BLOCKER;
+use glam::{Vec2, Vec3};
+use std::f32::consts::PI;
+use std::ops::ControlFlow;
+
+/// Sides of the grid of directions of one estimate.
+const GRID: u32 = 8;
+/// Rays of one estimate toward emitters; leaves that are brighter than others get up to `MOST_BRIGHT` times as many.
+const TOWARD_EMITTERS: u32 = 32;
+const MOST_BRIGHT: f32 = 16.0;
+
+/// Leaves that a thread looks from between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 32;
+
+/// About how many rays one leaf takes.
+pub(crate) const RAYS_PER_LEAF: u64 = 2 * (GRID * GRID + TOWARD_EMITTERS) as u64;
+
+/// What a solution is off by.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Residual {
+    /// Mean absolute difference of the leaves' irradiance, weighted by what they reflect, relative to its mean …
+    pub(crate) absolute: f32,
+    /// … and the same with its sign: positive where there should be more light.
+    pub(crate) signed: f32,
+    /// Share of the light that was reflected before.
+    pub(crate) indirect: f32,
+    /// Rays shot.
+    pub(crate) rays: u64,
+}
+
+impl Residual {
+    /// Light that is missing, relative to all there is.
+    pub(crate) fn bias(&self) -> f32 {
+        self.signed / (1.0 - self.indirect).max(0.05)
+    }
+
+    /// Relative L1 error of the solution: what has one sign is repeated by each bounce, the rest averages out.
+    pub(crate) fn error(&self) -> f32 {
+        let repeated = self.bias();
+        let random = (self.absolute * self.absolute - self.signed * self.signed).max(0.0);
+        (random + repeated * repeated).sqrt()
+    }
+}
+
+/// What was found at a leaf (sums of channels).
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    estimates: [f32; 2],
+    /// The share of emitters in their mean.
+    direct: f32,
+    /// What the solution says.
+    solution: f32,
+    rays: u32,
+}
+
+/// Looks at a solution from so many random leaves; `None` where `watch` breaks.
+pub(crate) fn residual<L: LightField>(
+    light: Light<'_, L>,
+    count: usize,
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Residual> {
+    // Leaves are drawn by what they reflect: half of them as if all were lit alike, half as they are.
+    let weight = |leaf: u32| {
+        let element = light.element(leaf);
+        // Of covered parts the solution says nothing.
+        let counts = element.importance > 0.0 && light.elements.exposed(leaf) >= 1.0;
+        if counts { f64::from(element.area * element.importance) } else { 0.0 }
+    };
+    let irradiance = |leaf: u32| f64::from(light.exitant.irradiance[leaf as usize].element_sum());
+    let (mut area, mut power) = (0.0, 0.0);
+    for leaf in light.elements.patch_leaves() {
+        area += weight(leaf);
+        power += weight(leaf) * irradiance(leaf);
+    }
+    let mean = power / area;
+    let mut sum = 0.0;
+    let mut ends: Vec<(u32, f64)> = Vec::new();
+    for leaf in light.elements.patch_leaves() {
+        let share = weight(leaf) * (mean + irradiance(leaf));
+        if share > 0.0 {
+            sum += share;
+            ends.push((leaf, sum));
+        }
+    }
+    if ends.is_empty() || !sum.is_finite() {
+        return Some(Residual::default());
+    }
+    let emitters = Emitters::new(light);
+    let look = |i: usize| {
+        let at = (i as f64 + f64::from(unit(hash(i as u32, 0x51de)))) / count as f64 * sum;
+        let leaf = ends[ends.partition_point(|&(_, end)| end <= at).min(ends.len() - 1)].0;
+        look(light, &emitters, mean as f32, leaf, i as u32)
+    };
+    let mut found: Vec<Found> = Vec::with_capacity(count);
+    while found.len() < count {
+        if watch().is_break() {
+            return None;
+        }
+        let part = found.len()..count.min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
+        found.par_extend(part.into_par_iter().with_min_len(1).map(look));
+    }
+    let (mut absolute, mut noise, mut signed, mut total, mut direct, mut rays) = (0.0, 0.0, 0.0, 0.0, 0.0, 0);
+    for leaf in &found {
+        let [a, b] = leaf.estimates.map(f64::from);
+        let solution = f64::from(leaf.solution);
+        let share = (mean + solution).recip();
+        let off = 0.5 * (a + b) - solution;
+        absolute += share * off.abs();
+        noise += share * (0.5 * (a - b)).abs();
+        signed += share * off;
+        total += share * 0.5 * (a + b);
+        direct += share * f64::from(leaf.direct);
+        rays += u64::from(leaf.rays);
+    }
+    if total <= 0.0 {
+        return Some(Residual { rays, ..Residual::default() });
+    }
+    // Half the difference of the estimates is distributed as the noise of their mean.
+    let absolute = (absolute * absolute - noise * noise).max(0.0).sqrt();
+    Some(Residual {
+        absolute: (absolute / total) as f32,
+        signed: (signed / total) as f32,
+        indirect: (1.0 - direct / total).clamp(0.0, 1.0) as f32,
+        rays,
+    })
+}
+
+/// What emits.
+struct Emitters {
+    /// Power below each node, sum of channels, of what has an extent.
+    power: Vec<f32>,
+    /// Nodes of lights without extent.
+    lights: Vec<u32>,
+}
+
+impl Emitters {
+    fn new<L: LightField>(light: Light<'_, L>) -> Self {
+        let is_light = |&node: &u32| light.element(node).kind == Kind::Light;
+        let lights = (0..light.elements.nodes.len() as u32).filter(is_light).collect();
+        Self { power: light.emitted_power(), lights }
+    }
+
+    /// A leaf with extent, drawn by its power over its squared distance from `x`, and the probability of that.
+    fn pick<L: LightField>(&self, light: Light<'_, L>, x: Vec3, mut choice: f32) -> Option<(u32, f32)> {
+        let (mut node, mut probability) = (0, 1.0);
+        loop {
+            let element = light.element(node);
+            if element.child_count == 0 {
+                return Some((node, probability));
+            }
+            let weight = |child: u32| {
+                let part = light.element(child);
+                let apart = x.distance_squared(part.center) + part.radius * part.radius;
+                self.power[child as usize] / apart.max(1e-20)
+            };
+            let children = element.first_child..element.first_child + element.child_count;
+            let total: f32 = children.clone().map(weight).sum();
+            let (picked, rest) = pick(children.clone().map(weight), choice, total)?;
+            (node, choice) = (children.start + picked as u32, rest);
+            probability *= weight(node) / total;
+        }
+    }
+}
+
+/// A random point of a leaf, with its normal.
+fn point<L: LightField>(light: Light<'_, L>, leaf: u32, u: Vec2) -> (Vec3, Vec3) {
+    let element = light.element(leaf);
+    let (x, normal, _) = light.scene.surfaces()[element.source as usize].sample_area(element.domain, u.x, u.y);
+    (x, if element.kind == Kind::Back { -normal } else { normal })
+}
+
+/// Looks around from all over a leaf.
+fn look<L: LightField>(light: Light<'_, L>, emitters: &Emitters, mean: f32, leaf: u32, seed: u32) -> Found {
+    let solution = light.exitant.irradiance[leaf as usize].element_sum();
+    let count = (TOWARD_EMITTERS as f32 * (solution / mean).clamp(1.0, MOST_BRIGHT)) as u32;
+    let mut found = Found { estimates: [0.0; 2], direct: 0.0, solution, rays: 0 };
+    for half in 0..2 {
+        let seed = hash(seed, 0x77 + half);
+        let (lights, shot) = from_lights(light, emitters, leaf, seed);
+        let (surfaces, also) = from_emitters(light, emitters, leaf, (seed, count));
+        found.direct += 0.5 * (lights + surfaces);
+        found.estimates[half as usize] = lights + surfaces + reflected(light, leaf, seed);
+        found.rays += shot + also + GRID * GRID;
+    }
+    found
+}
+
+/// Irradiance by lights without extent at a random point, and the rays shot for it.
+fn from_lights<L: LightField>(light: Light<'_, L>, emitters: &Emitters, leaf: u32, seed: u32) -> (f32, u32) {
+    let surface = light.element(leaf).source;
+    let (mut sum, mut rays) = (0.0, 0);
+    for &node in &emitters.lights {
+        let u = point4(hash(seed, node), 0);
+        let (x, n) = point(light, leaf, Vec2::new(u.x, u.y));
+        let index = light.element(node).source as usize;
+        let (to, cosine) = light_segment(light.scene, index, x, n);
+        let irradiance = light.scene.lights[index].intensity.element_sum() * light.factor_at(x, n, node);
+        if cosine > 0.0 && irradiance > 0.0 {
+            rays += 1;
+            let hidden = light.scene.visibility.occluded(x, to, [surface, u32::MAX], &mut NO_BLOCKER.clone());
+            sum += if hidden { 0.0 } else { irradiance };
+        }
+    }
+    (sum, rays)
+}
+
+/// Mean irradiance by emitted light, from `count` rays toward random points, and the number that was shot.
+fn from_emitters<L: LightField>(
+    light: Light<'_, L>,
+    emitters: &Emitters,
+    leaf: u32,
+    (seed, count): (u32, u32),
+) -> (f32, u32) {
+    if emitters.power[0] <= 0.0 {
+        return (0.0, 0);
+    }
+    let surface = light.element(leaf).source;
+    let (mut sum, mut rays, mut blocker) = (0.0, 0, NO_BLOCKER);
+    for ray in 0..count {
+        let u = point4(seed, ray);
+        let (x, n) = point(light, leaf, Vec2::new(u.z, u.w));
+        let Some((emitter, probability)) = emitters.pick(light, x, unit(hash(seed, ray))) else { continue };
+        let (at, normal) = point(light, emitter, Vec2::new(u.x, u.y));
+        let to = at - x;
+        let d2 = to.length_squared();
+        let cosines = to.dot(n).max(0.0) * (-to.dot(normal)).max(0.0);
+        if cosines > 0.0 && d2 > 0.0 {
+            rays += 1;
+            let skip = [surface, light.element(emitter).source];
+            if !light.scene.visibility.occluded(x, at, skip, &mut blocker) {
+                sum += emitters.power[emitter as usize] * (cosines / d2) / (PI * d2 * probability);
+            }
+        }
+    }
+    (sum / count as f32, rays)
+}
+
+/// Mean irradiance by light that has been reflected, over stratified directions.
+fn reflected<L: LightField>(light: Light<'_, L>, leaf: u32, seed: u32) -> f32 {
+    let surface = light.element(leaf).source;
+    let mut sum = 0.0;
+    for cell in 0..GRID * GRID {
+        let u = point4(seed ^ 0x3c3c, cell);
+        let (x, n) = point(light, leaf, Vec2::new(u.z, u.w));
+        let direction = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + Vec2::new(u.x, u.y)) / GRID as f32;
+        let direction = cosine_direction(n, direction.x, direction.y);
+        let Some(hit) = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface) else { continue };
+        let Some(sender) = light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv) else { continue };
+        let element = light.element(sender.0);
+        let emitted = match element.kind {
+            Kind::Front => light.scene.materials[element.material as usize].exitance.element_sum(),
+            _ => 0.0,
+        };
+        sum += (light.emitted(sender.0, -direction).element_sum() - emitted).max(0.0);
+    }
+    sum / (GRID * GRID) as f32
+}
