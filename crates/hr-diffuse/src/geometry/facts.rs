@@ -43,6 +43,16 @@ impl Geometry {
         }
     }
 
+    /// The least coordinate of the whole surface along a unit direction.
+    pub(crate) fn lowest(&self, direction: Vec3) -> f32 {
+        let of = |points: &[Vec3]| points.iter().map(|p| p.dot(direction)).fold(f32::INFINITY, f32::min);
+        match self {
+            Self::Triangle(triangle) => of(triangle.points()),
+            Self::Quad(quad) => of(quad.points()),
+            Self::Revolution(revolution) => revolution.lowest(direction),
+        }
+    }
+
     /// Centre and radius, if it is a sphere.
     #[must_use]
     pub fn sphere(&self) -> Option<(Vec3, f32)> {

@@ -189,6 +189,17 @@ impl Revolution {
         self.frame[2]
     }
 
+    /// The least coordinate of the whole surface along a unit direction.
+    pub(super) fn lowest(&self, direction: Vec3) -> f32 {
+        let along = direction.dot(self.axis());
+        let across = (1.0 - along * along).max(0.0).sqrt();
+        let below = match self.profile {
+            Profile::Line { from, to } => (along * from.y - across * from.x).min(along * to.y - across * to.x),
+            Profile::Arc { center, radius, .. } => -across * center - radius,
+        };
+        direction.dot(self.center) + below
+    }
+
     pub(super) fn is_flat(&self) -> bool {
         matches!(self.profile, Profile::Line { from, to } if from.y == to.y)
     }
