@@ -10,7 +10,6 @@ use crate::gather::Group;
 use crate::hierarchy::{Element, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
 use crate::links::{Link, Links};
-use crate::proofs;
 use crate::segments::visibility;
 use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
@@ -126,9 +125,6 @@ impl Push {
             parts.push((leaf, part));
             rest = after;
         }
-        // What is between the nodes of a link is all that can be between one of its leaves and its sender.
-        let proofs = links.all().par_iter().zip(&push.spreads).with_min_len(64);
-        let proofs: Vec<Proof> = proofs.map(|(link, spread)| proof(light, link, *spread)).collect();
         let chunk = if error.is_some() { BETWEEN_WATCHES * threads::current_num_threads() } else { parts.len().max(1) };
         let mut rays = 0;
         for part in parts.chunks_mut(chunk) {
@@ -139,8 +135,7 @@ impl Push {
                 let (mut slots, mut rays) = (weights.iter_mut(), 0);
                 push.each(light, links, *leaf, |place, at| {
                     if let Some(slot) = slots.next() {
-                        let known = (push.spreads[at], push.means[at], &proofs[at]);
-                        let (weight, shot) = place.weight(light, &links.all()[at], known);
+                        let (weight, shot) = place.weight(light, &links.all()[at], (push.spreads[at], push.means[at]));
                         *slot = weight;
                         rays += u64::from(shot);
                     }
@@ -231,15 +226,6 @@ fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -
     (if closely { Spread::Exact } else { even }, mean)
 }
 
-/// What is proved of a link whose leaves look for themselves.
-fn proof<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> Proof {
-    match spread {
-        Spread::Exact if link.visibility < 0.0 => Proof::Free,
-        Spread::Exact => proofs::prove(light.scene, light.element(link.receiver), light.element(link.sender)),
-        Spread::Even | Spread::Plain => Proof::Unknown,
-    }
-}
-
 /// A leaf, and the points that stand for it.
 struct Place {
     leaf: u32,
@@ -276,12 +262,7 @@ impl Place {
 
     /// The same as asked for, and the number of rays shot; `mean` is what the link would bring to its receiver if it were wholly
     /// visible.
-    fn weight<L: LightField>(
-        &self,
-        light: Light<'_, L>,
-        link: &Link,
-        (spread, mean, proof): (Spread, f32, &Proof),
-    ) -> (f32, u32) {
+    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, (spread, mean): (Spread, f32)) -> (f32, u32) {
         if spread != Spread::Exact {
             return (self.plain(light, link, spread), 0);
         }
@@ -312,22 +293,16 @@ impl Place {
         if link.visibility < 0.0 {
             return (weight, 0);
         }
-        let (seen, rays) = self.seen(light, link.sender, here * visible, proof);
+        let (seen, rays) = self.seen(light, link, here * visible);
         (weight * seen / visible, rays)
     }
 
     /// Share of a link's sender that the leaf sees, by as many rays as what it brings is worth, and their number.
-    fn seen<L: LightField>(&self, light: Light<'_, L>, sender: u32, brings: f32, proof: &Proof) -> (f32, u32) {
-        let proof = proofs::narrowed(light.scene, light.element(self.leaf), light.element(sender), proof);
-        match proof {
-            Proof::Free => return (1.0, 0),
-            Proof::Blocked => return (0.0, 0),
-            _ => {}
-        }
+    fn seen<L: LightField>(&self, light: Light<'_, L>, link: &Link, brings: f32) -> (f32, u32) {
         let irradiance = light.exitant.irradiance[self.leaf as usize].element_sum();
         let rays = (RAYS * brings / irradiance.max(f32::MIN_POSITIVE)).clamp(LEAST_RAYS, MOST_RAYS) as u32;
         let mut blocker = u32::MAX;
-        let (seen, total, rays) = visibility(light, self.leaf, sender, 0..rays, (&proof, &mut blocker));
+        let (seen, total, rays) = visibility(light, self.leaf, link.sender, 0..rays, (&Proof::Unknown, &mut blocker));
         (if total > 0.0 { seen / total } else { 0.0 }, rays)
     }
 }

@@ -90,23 +90,28 @@ fn draw(
                 Some(from) => draw_part(geometry, element, from, choice),
                 None => Part { domain: element.domain, area: element.area, rarity: 1.0 },
             };
-            let (at, normal, _) = geometry.sample_area(part.domain, u.x, u.y);
+            let (at, normal) = geometry.sample(part.domain, u.x, u.y);
             let normal = if element.kind == Kind::Back { -normal } else { normal };
             let (surface, area) = (element.source, part.area);
             return Some(Point { at, normal, surface, area, rarity: rarity * part.rarity });
         }
         let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
-        let plain = |child: usize| elements.nodes[child].area * density.of(elements, child);
-        let nearness = |child: usize| {
-            let (at, radius) = (elements.nodes[child].center, elements.nodes[child].radius);
-            from.map_or(1.0, |from| (from.distance_squared(at) + radius * radius).max(1e-20).recip())
+        let nearness = |element: &Element| match from {
+            Some(from) => (from.distance_squared(element.center) + element.radius * element.radius).max(1e-20).recip(),
+            None => 1.0,
         };
-        let weight = |child: usize| plain(child) * nearness(child);
-        let total: f32 = children.clone().map(weight).sum();
-        let even: f32 = children.clone().map(plain).sum();
-        let (child, rest) = pick(children.clone().map(weight), choice, total)?;
+        let (mut even, mut total) = (0.0, 0.0);
+        let mut weights: SmallVec<[f32; 4]> = SmallVec::new();
+        for child in children.clone() {
+            let plain = elements.nodes[child].area * density.of(elements, child);
+            let weight = plain * nearness(&elements.nodes[child]);
+            even += plain;
+            total += weight;
+            weights.push(weight);
+        }
+        let (child, rest) = pick(weights.into_iter(), choice, total)?;
         (node, choice) = ((children.start + child) as u32, rest);
-        rarity *= total / (even * nearness(node as usize)).max(f32::MIN_POSITIVE);
+        rarity *= total / (even * nearness(&elements.nodes[node as usize])).max(f32::MIN_POSITIVE);
     }
 }
 
@@ -127,14 +132,19 @@ fn draw_part(geometry: &Geometry, element: &Element, from: Vec3, mut choice: f32
             break;
         }
         radius *= 0.5;
-        let weigh = |&domain: &Domain| {
+        let (mut even, mut total) = (0.0, 0.0);
+        let domains = geometry.split(drawn.domain);
+        // By part: area, squared distance, weight.
+        let mut parts = [(0.0, 0.0, 0.0); 4];
+        for (part, &domain) in parts.iter_mut().zip(&domains) {
             let (area, apart) = (geometry.area(domain), geometry.point(geometry.middle(domain)).distance_squared(from));
-            (domain, area, apart, area / (apart + radius * radius).max(1e-20))
-        };
-        let parts: SmallVec<[(Domain, f32, f32, f32); 4]> = geometry.split(drawn.domain).iter().map(weigh).collect();
-        let (even, total) = parts.iter().fold((0.0, 0.0), |(even, total), part| (even + part.1, total + part.3));
-        let Some((picked, rest)) = pick(parts.iter().map(|part| part.3), choice, total) else { break };
-        let (domain, area, distance, weight) = parts[picked];
+            let weight = area / (apart + radius * radius).max(1e-20);
+            even += area;
+            total += weight;
+            *part = (area, apart, weight);
+        }
+        let Some((picked, rest)) = pick(parts.iter().map(|part| part.2), choice, total) else { break };
+        let (domain, (area, distance, weight)) = (domains[picked], parts[picked]);
         let rarity = drawn.rarity * total * area / (even * weight).max(f32::MIN_POSITIVE);
         (drawn, apart, choice) = (Part { domain, area, rarity }, distance, rest);
     }

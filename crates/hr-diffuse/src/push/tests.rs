@@ -1,9 +1,8 @@
-use super::{FAINT_SHARE, LEAST_VISIBLE, Push, Spread, proof, visible};
+use super::{FAINT_SHARE, LEAST_VISIBLE, Push, Spread, visible};
 use crate::gather::Group;
 use crate::links::{Link, Links};
 use crate::skips::Skips;
 use crate::skips::tests::{room, solve};
-use crate::visibility::Proof;
 use glam::Vec3;
 use std::ops::ControlFlow;
 
@@ -105,26 +104,4 @@ fn links_that_look_blocked_lose_nothing() {
     };
     let (open, blocked) = (brought(|visibility| visibility), brought(|_| 0.0));
     assert!((blocked / open - 1.0).abs() < 0.1, "{blocked} of {open}");
-}
-
-/// What is proved of a link and its leaves spares rays, and no light.
-#[test]
-fn proofs_change_no_weights() {
-    let solver = solve(&room(), ERROR, (), Skips::ALL);
-    let (light, links) = (solver.light(), &solver.links);
-    let push = Push::new(light, links, Some(ERROR), u64::MAX, &mut || ControlFlow::Continue(()));
-    let (mut rays, mut apart, mut all) = ([0, 0], 0.0, 0.0);
-    for &leaf in &push.leaves {
-        push.each(light, links, leaf, |place, at| {
-            let link = Link { visibility: links.all()[at].visibility.abs(), ..links.all()[at] };
-            let proofs = [proof(light, &link, push.spreads[at]), Proof::Unknown];
-            let [with, without] =
-                proofs.map(|proof| place.weight(light, &link, (push.spreads[at], push.means[at], &proof)));
-            rays = [rays[0] + with.1, rays[1] + without.1];
-            apart += (with.0 - without.0).abs() * push.means[at];
-            all += without.0 * push.means[at];
-        });
-    }
-    assert!(2 * rays[0] < rays[1], "rays with proofs and without: {rays:?}");
-    assert!(apart < 1e-3 * all, "weights differ by {} of their sum", apart / all);
 }

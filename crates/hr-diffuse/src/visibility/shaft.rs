@@ -3,12 +3,12 @@
 //!
 //! The shaft holds all segments from points of one set to points of the other that face each other. Where no other
 //! surface enters it, every segment is free; where a single polygon cuts it across, none is. What enters and does not cut
-//! is listed: rays need be tested against no others, nor need the shafts of parts of the two sets.
+//! is listed: rays need be tested against no others.
 
 use super::{HalfSpace, Span, Visibility};
 use crate::geometry::{Aabb, Geometry};
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
-use smallvec::{SmallVec, smallvec};
+use smallvec::SmallVec;
 
 /// What enters a shaft no deeper than this does not enter, in unit space: touching surfaces, of which rounding lets some
 /// stick in. Four times the padding of boxes, of which two may meet.
@@ -33,50 +33,82 @@ pub(crate) enum Proof {
     Blocked,
 }
 
+/// Up to eight points side by side, of fewer some twice.
+#[derive(Clone, Debug)]
+struct Corners {
+    /// Of these so many are there, …
+    count: usize,
+    /// … x, y and z of four each.
+    four: [[Vec4; 3]; 2],
+}
+
+impl Corners {
+    fn new(points: &[Vec3]) -> Self {
+        let last = points.len() - 1;
+        let of = |axis: usize, first: usize| Vec4::from_array([0, 1, 2, 3].map(|i| points[last.min(first + i)][axis]));
+        Self { count: points.len(), four: [0, 4].map(|first| [0, 1, 2].map(|axis| of(axis, first))) }
+    }
+
+    fn get(&self, i: usize) -> Vec3 {
+        Vec3::from_array(self.four[i / 4].map(|axis| axis[i % 4]))
+    }
+
+    fn iter(&self) -> impl Iterator<Item = Vec3> + '_ {
+        (0..self.count).map(|i| self.get(i))
+    }
+
+    /// Least and greatest height along a direction, over a point.
+    #[inline]
+    fn heights(&self, direction: Vec3, over: Vec3) -> [f32; 2] {
+        let height =
+            |[x, y, z]: [Vec4; 3]| (x - over.x) * direction.x + (y - over.y) * direction.y + (z - over.z) * direction.z;
+        let (mut low, mut high) = (height(self.four[0]), height(self.four[0]));
+        if self.count > 4 {
+            let more = height(self.four[1]);
+            (low, high) = (low.min(more), high.max(more));
+        }
+        [low.min_element(), high.max_element()]
+    }
+}
+
 /// A set that segments start from or end at, as far as shafts know it.
 #[derive(Clone, Debug)]
 pub(crate) struct End {
-    /// Of a convex set that holds it: of a polygon in order, of a box as [`Aabb::corners`] has them, or a single point.
-    corners: SmallVec<[Vec3; 8]>,
+    /// Of a convex set that holds it: of a polygon in order, of a box, or a single point.
+    corners: Corners,
     bounds: Aabb,
     /// Normal of, and distance from the origin to, a plane that all segments are before.
     plane: Option<Vec4>,
 }
 
 impl End {
-    /// A polygon, seen from where its unit `normal` points.
-    pub(crate) fn polygon(corners: impl IntoIterator<Item = Vec3>, normal: Vec3) -> Self {
-        let corners: SmallVec<[Vec3; 8]> = corners.into_iter().collect();
-        let bounds = Aabb::of_points(corners.iter().copied());
+    /// A triangle or quadrilateral, seen from where its unit `normal` points.
+    pub(crate) fn polygon(corners: &[Vec3], normal: Vec3) -> Self {
         let height = corners.iter().map(|p| normal.dot(*p)).fold(f32::INFINITY, f32::min);
-        Self { corners, bounds, plane: Some(normal.extend(height)) }
+        let bounds = Aabb::of_points(corners.iter().copied());
+        Self { corners: Corners::new(corners), bounds, plane: Some(normal.extend(height)) }
     }
 
     /// All that is in a box.
     pub(crate) fn within(bounds: Aabb) -> Self {
-        Self { corners: bounds.corners().into_iter().collect(), bounds, plane: None }
+        Self { corners: Corners::new(&bounds.corners()), bounds, plane: None }
     }
 
     /// A point.
     pub(crate) fn point(at: Vec3) -> Self {
-        Self { corners: smallvec![at], bounds: Aabb { min: at, max: at }, plane: None }
+        Self { corners: Corners::new(&[at]), bounds: Aabb { min: at, max: at }, plane: None }
     }
 
     /// Moved elsewhere, and seen from everywhere.
     pub(crate) fn shifted(&self, by: Vec3) -> Self {
+        let corners: SmallVec<[Vec3; 8]> = self.corners.iter().map(|p| p + by).collect();
         let bounds = Aabb { min: self.bounds.min + by, max: self.bounds.max + by };
-        Self { corners: self.corners.iter().map(|&p| p + by).collect(), bounds, plane: None }
+        Self { corners: Corners::new(&corners), bounds, plane: None }
     }
 
     /// Whether it is all of what segments start from or end at, not a box around it.
     fn is_exact(&self) -> bool {
-        self.corners.len() < 8
-    }
-
-    /// Least and greatest distance from a plane through a point, before it.
-    fn heights(&self, normal: Vec3, through: Vec3) -> [f32; 2] {
-        let each = self.corners.iter().map(|&p| normal.dot(p - through));
-        each.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], height| [low.min(height), high.max(height)])
+        self.corners.count <= 4
     }
 }
 
@@ -123,18 +155,21 @@ impl Shaft {
 
     /// Sides of the hull of two polygons or points, with outward normals: each passes through an edge of one and a corner of
     /// the other, and has everything on one side.
-    fn sides(&self) -> SmallVec<[Vec4; 24]> {
+    fn sides(&self) -> SmallVec<[Vec4; 16]> {
         let mut sides = SmallVec::new();
-        for (one, other) in [(&self.ends[0], &self.ends[1]), (&self.ends[1], &self.ends[0])] {
-            for (i, &a) in one.corners.iter().enumerate() {
-                let b = one.corners[(i + 1) % one.corners.len()];
-                for &c in &other.corners {
-                    let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
-                    let [[low, high], [least, most]] = [one, other].map(|end| end.heights(normal, a));
-                    if high.max(most) <= TOUCHING {
+        for (one, other) in
+            [(&self.ends[0].corners, &self.ends[1].corners), (&self.ends[1].corners, &self.ends[0].corners)]
+        {
+            for i in 0..one.count {
+                let (a, b) = (one.get(i), one.get((i + 1) % one.count));
+                for c in other.iter() {
+                    let across = (b - a).cross(c - a);
+                    let [[low, high], [least, most]] = [one, other].map(|corners| corners.heights(across, a));
+                    let (low, high, length) = (low.min(least), high.max(most), across.length());
+                    let outward = if high <= TOUCHING * length { length } else { -length };
+                    if high.min(-low) <= TOUCHING * length && length > 0.0 {
+                        let normal = across / outward;
                         sides.push(normal.extend(normal.dot(a)));
-                    } else if low.min(least) >= -TOUCHING {
-                        sides.push(-normal.extend(normal.dot(a)));
                     }
                 }
             }
@@ -142,29 +177,19 @@ impl Shaft {
         sides
     }
 
-    /// Whether a surface may have points on the inner side of all planes.
-    fn is_inside_of(geometry: &Geometry, planes: &[Vec4]) -> bool {
-        planes.iter().all(|plane| geometry.lowest(plane.xyz()) < plane.w - TOUCHING)
-    }
-
-    /// How a surface stands to it, as far as the planes tell.
+    /// How a surface stands to it, as far as boxes and planes tell.
     fn stand(&self, geometry: &Geometry) -> Stand {
-        if !Self::is_inside_of(geometry, &self.planes) {
+        let Some(polygon) = geometry.polygon() else {
+            return if is_inside(geometry, &self.planes) { Stand::Enters } else { Stand::Outside };
+        };
+        let normal = geometry.normal(Vec2::ZERO);
+        let [[low, high], [least, most]] = [0, 1].map(|end: usize| self.ends[end].corners.heights(normal, polygon[0]));
+        let on_one_side = low.min(least) >= -TOUCHING || high.max(most) <= TOUCHING;
+        if on_one_side || !is_inside(geometry, &self.planes) {
             return Stand::Outside;
         }
-        if !geometry.is_flat() {
-            return Stand::Enters;
-        }
-        let (normal, through) = (geometry.normal(Vec2::ZERO), geometry.point(Vec2::ZERO));
-        let [[low, high], [least, most]] = [0, 1].map(|end: usize| self.ends[end].heights(normal, through));
-        let on_one_side = low.min(least) >= -TOUCHING || high.max(most) <= TOUCHING;
         let between = low >= APART && most <= -APART || least >= APART && high <= -APART;
-        match geometry {
-            _ if on_one_side => Stand::Outside,
-            Geometry::Triangle(triangle) if between && self.passes_through(triangle.points(), normal) => Stand::Cuts,
-            Geometry::Quad(quad) if between && self.passes_through(quad.points(), normal) => Stand::Cuts,
-            _ => Stand::Enters,
-        }
+        if between && self.passes_through(polygon, normal) { Stand::Cuts } else { Stand::Enters }
     }
 
     /// Whether every segment passes through a convex polygon whose plane is between the two ends. The points where segments
@@ -175,8 +200,13 @@ impl Shaft {
             from + (to - from) * (above / (above - below))
         };
         let [from, to] = &self.ends;
-        from.corners.iter().all(|&p| to.corners.iter().all(|&q| holds(polygon, normal, crossing(p, q))))
+        from.corners.iter().all(|p| to.corners.iter().all(|q| holds(polygon, normal, crossing(p, q))))
     }
+}
+
+/// Whether a surface may have points on the inner side of all planes.
+fn is_inside(geometry: &Geometry, planes: &[Vec4]) -> bool {
+    planes.iter().all(|plane| geometry.lowest(plane.xyz()) < plane.w - TOUCHING)
 }
 
 /// Whether a convex polygon holds a point of its plane, not at its very edge.
@@ -194,12 +224,12 @@ impl Visibility {
     /// What [`occluded`](Self::occluded) answers for a segment of which something is proved.
     pub(crate) fn occluded_given(&self, proof: &Proof, from: Vec3, to: Vec3, skip: [u32; 2], cache: &mut u32) -> bool {
         match proof {
-            Proof::Unknown => self.occluded(from, to, skip, cache),
             Proof::Free => false,
             Proof::Blocked => true,
             Proof::Among(surfaces) => Span::new(from, to, skip).is_some_and(|span| {
                 surfaces.iter().any(|&surface| self.blocks(self.primitive_of[surface as usize], &span))
             }),
+            Proof::Unknown => self.occluded(from, to, skip, cache),
         }
     }
 
@@ -212,17 +242,6 @@ impl Visibility {
         let planes: SmallVec<[HalfSpace; 8]> =
             shaft.planes.iter().map(|plane| HalfSpace::new(plane.xyz(), plane.w - TOUCHING)).collect();
         self.any_within(&within, &planes, |surface| self.enter(shaft, own, surface, &mut entering));
-        self.judge(shaft, entering)
-    }
-
-    /// The same where no surface but those of a list can enter: one of a shaft that holds this one.
-    pub(crate) fn prove_among(&self, shaft: &Shaft, own: [u32; 2], candidates: &[u32]) -> Proof {
-        let mut entering = Entering::new(candidates.len());
-        for &surface in candidates {
-            if self.enter(shaft, own, surface, &mut entering) {
-                break;
-            }
-        }
         self.judge(shaft, entering)
     }
 
@@ -249,7 +268,7 @@ impl Visibility {
         }
         if !surfaces.is_empty() && shaft.ends.iter().all(End::is_exact) {
             let sides = shaft.sides();
-            surfaces.retain(|surface| Shaft::is_inside_of(&self.geometries[*surface as usize], &sides));
+            surfaces.retain(|surface| is_inside(&self.geometries[*surface as usize], &sides));
         }
         if surfaces.is_empty() { Proof::Free } else { Proof::Among(surfaces) }
     }
