@@ -30,7 +30,7 @@ pub enum Command {
     Threads(ThreadsArgs),
     /// Form factors against closed forms and brute force: a Markdown table
     FormFactors(FormFactorArgs),
-    /// Rays per second on one thread: a Markdown table
+    /// Rays per second on one thread, and links that need none: Markdown tables
     Visibility(VisibilityArgs),
     /// The paper's tables 1 to 4 and figures 4 and 7, made anew: a Markdown page with pictures
     Paper(PaperArgs),
@@ -212,6 +212,10 @@ pub struct VisibilityArgs {
     /// Rays of each kind
     #[arg(long, value_name = "N", default_value_t = 1 << 19, value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
     pub rays: u32,
+
+    /// Solve with this error, and show what is proved of links and what could be
+    #[arg(long, value_name = "E")]
+    pub error: Option<f32>,
 }
 
 /// Of `hr-bench paper`.

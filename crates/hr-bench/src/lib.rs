@@ -10,7 +10,7 @@
 //! | `growth` | time and memory of generated scenes over their size |
 //! | `threads` | what more threads bring, and that they change nothing |
 //! | `form-factors` | form factors against closed forms and brute force |
-//! | `visibility` | rays per second |
+//! | `visibility` | rays per second, and links that need none |
 //! | `paper` | what the paper's tables and figures compare |
 //! | `view` | time of frames along a walk |
 

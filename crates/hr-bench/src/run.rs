@@ -106,9 +106,9 @@ fn measure_accuracy(args: &AccuracyArgs, out: Out<'_>) -> Result<(), BenchError>
 }
 
 fn measure_visibility(args: &VisibilityArgs, out: Out<'_>) -> Result<(), BenchError> {
-    let scene = Scene::load(&args.scene)?;
+    let scene = Arc::new(Scene::load(&args.scene)?);
     let camera = camera(&scene, None)?;
-    visibility::report(&scene, &camera, args.rays, out)
+    visibility::report(&scene, &camera, args.rays, args.error, out)
 }
 
 fn measure_threads(args: &ThreadsArgs, out: Out<'_>) -> Result<(), BenchError> {

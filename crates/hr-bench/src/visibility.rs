@@ -1,7 +1,9 @@
-//! Speed of the rays, on one thread: every kind of query on the same segments, in the same run.
+//! Speed of the rays, on one thread: every kind of query on the same segments, in the same run; and how many links need none.
 //!
 //! The measure is obvhs's own any-hit query on its own binary tree, over the same surfaces (quadrilaterals as two
 //! triangles).
+
+mod links;
 
 use crate::BenchError;
 use crate::run::{Out, say};
@@ -16,6 +18,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::Ray;
 use obvhs::triangle::Triangle;
 use obvhs::{Boundable, BvhBuildParams};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Segments between one pair of small patches, as a link asks for them.
@@ -145,11 +148,17 @@ impl<'a> Stock<'a> {
 type Query<'a> = (String, Box<dyn Fn(&[Segment]) -> usize + 'a>);
 
 /// Prints millions of rays per second for random segments, for segments between pairs of patches, and for a camera's
-/// rays.
+/// rays; where an `error` is given, what is proved of the links of a solution with it, too.
 ///
 /// # Errors
 /// [`BenchError::Solve`] where a surface makes no sense, [`BenchError::Output`] where nothing can be printed.
-pub fn report(scene: &Scene, camera: &Camera, rays: u32, out: Out<'_>) -> Result<(), BenchError> {
+pub fn report(
+    scene: &Arc<Scene>,
+    camera: &Camera,
+    rays: u32,
+    error: Option<f32>,
+    out: Out<'_>,
+) -> Result<(), BenchError> {
     let visibility = &path_tracer::visibility(scene)?;
     let areas = Areas::new(visibility);
     let surfaces = visibility.geometries();
@@ -189,7 +198,8 @@ pub fn report(scene: &Scene, camera: &Camera, rays: u32, out: Out<'_>) -> Result
     let start = Instant::now();
     let hits = directions.iter().filter(|&&d| visibility.closest(eye, d, 0.0, f32::MAX).is_some()).count();
     let seconds = start.elapsed().as_secs_f64();
-    row("a camera's", "closest hit", directions.len(), hits, [seconds, f64::NAN], out)
+    row("a camera's", "closest hit", directions.len(), hits, [seconds, f64::NAN], out)?;
+    error.map_or(Ok(()), |error| links::report(&scene.input(), error, out))
 }
 
 fn row(

@@ -101,7 +101,7 @@ fn exposed_share(scene: &SceneData, elements: &Elements, leaf: u32) -> f32 {
     let sign = if back { -1.0 } else { 1.0 };
     let dark = |i: u32, ray: u32| {
         let u = point2(hash(leaf, 0xe7), i);
-        let (x, normal, _) = geometry.sample_area(element.domain, u.x, u.y);
+        let (x, normal) = geometry.sample(element.domain, u.x, u.y);
         let v = point2(hash(leaf, 0xe8), i * RAYS + ray);
         let direction = cosine_direction(normal * sign, v.x, v.y);
         let met = scene.visibility.first_side(x, direction, f32::MAX, element.source);

@@ -326,6 +326,7 @@ impl Stats {
             unlit_senders,
             facing,
             proved_free,
+            proved_blocked,
             sealed_sides,
             converged_leaves,
             faint_links,
@@ -337,7 +338,16 @@ impl Stats {
         };
         out.put(&[polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations.into(), bytes])?;
         out.put(&[stopped.into(), spent])?;
-        out.put(&[black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves, faint_links])?;
+        out.put(&[
+            black_receivers,
+            unlit_senders,
+            facing,
+            proved_free,
+            proved_blocked,
+            sealed_sides,
+            converged_leaves,
+            faint_links,
+        ])?;
         out.put(residuals)?;
         out.put(error.as_slice())?;
         out.put(&[bias])
@@ -347,8 +357,16 @@ impl Stats {
         const WHAT: &str = "statistics";
         let [polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations, bytes] = from.take_exactly(WHAT)?;
         let [stopped, spent] = from.take_exactly::<u64, 2>(WHAT)?;
-        let [black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves, faint_links] =
-            from.take_exactly(WHAT)?;
+        let [
+            black_receivers,
+            unlit_senders,
+            facing,
+            proved_free,
+            proved_blocked,
+            sealed_sides,
+            converged_leaves,
+            faint_links,
+        ] = from.take_exactly(WHAT)?;
         Ok(Self {
             polygons,
             nodes,
@@ -374,6 +392,7 @@ impl Stats {
                 unlit_senders,
                 facing,
                 proved_free,
+                proved_blocked,
                 sealed_sides,
                 converged_leaves,
                 faint_links,

@@ -104,7 +104,7 @@ pub(crate) fn balance<L: LightField>(
 fn sees_sender<L: LightField>(light: Light<'_, L>, leaf: u32, ray: u32) -> bool {
     let element = light.element(leaf);
     let (u, v) = (point2(hash(leaf, 0x8e1d), ray), point2(hash(leaf, 0x77a3), ray));
-    let (x, normal, _) = light.scene.surfaces()[element.source as usize].sample_area(element.domain, u.x, u.y);
+    let (x, normal) = light.scene.surfaces()[element.source as usize].sample(element.domain, u.x, u.y);
     let n = if element.kind == Kind::Back { -normal } else { normal };
     let direction = cosine_direction(n, v.x, v.y);
     let hit = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, element.source);

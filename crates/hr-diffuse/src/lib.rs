@@ -27,6 +27,7 @@ pub mod keep;
 mod leaf_rows;
 pub mod links;
 pub mod oracle;
+mod proofs;
 mod push;
 pub mod reconstruct;
 mod refine;

@@ -13,6 +13,7 @@ use crate::links::{Link, Links};
 use crate::segments::visibility;
 use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
+use crate::visibility::Proof;
 use glam::Vec3;
 use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
@@ -312,7 +313,7 @@ impl Place {
         let irradiance = light.exitant.irradiance[self.leaf as usize].element_sum();
         let rays = (RAYS * brings / irradiance.max(f32::MIN_POSITIVE)).clamp(LEAST_RAYS, MOST_RAYS) as u32;
         let mut blocker = u32::MAX;
-        let (seen, total, rays) = visibility(light, self.leaf, link.sender, 0..rays, &mut blocker);
+        let (seen, total, rays) = visibility(light, self.leaf, link.sender, 0..rays, (&Proof::Unknown, &mut blocker));
         (if total > 0.0 { seen / total } else { 0.0 }, rays)
     }
 }

@@ -321,32 +321,36 @@ fn gather_at<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, uv: V
         }
         node = light.element(node).parent;
     }
-    // Light whose visibility is renewed here, and light with the visibility that links have for something larger.
+    // Light whose visibility is known here, and light with the visibility that links have for something larger.
     let (mut own, mut kept) = ([Rgb::ZERO; 3], [Rgb::ZERO; 3]);
     let (mut rays, mut row) = (0, Row::default());
-    let mut renewed_here: SmallVec<[u32; 64]> = SmallVec::new();
+    let mut known_here: SmallVec<[u32; 64]> = SmallVec::new();
     let seed = hash(seed, 0x51ed);
     for Arriving { irradiance, share: view, mut visibility, sender } in arriving {
         let share = irradiance.max_element() / total;
         let partial = visibility > 0.0 && visibility < 1.0;
         let renewed = visibility >= 0.0 && share > if partial { PARTIAL_SHARE } else { WHOLE_SHARE };
+        // What is proved of a link holds everywhere.
+        let known = renewed || visibility < 0.0;
+        if known {
+            known_here.push(sender);
+        }
         if renewed {
-            renewed_here.push(sender);
             let count = (share * RAYS).clamp(1.0, MOST_RAYS) as u32;
             rays += count;
             visibility = visibility_at(light, (x, n, element.source), sender, count, seed);
         }
         let group = Group::of(light, sender);
-        (if renewed { &mut own } else { &mut kept })[group as usize] += irradiance * visibility.abs();
+        (if known { &mut own } else { &mut kept })[group as usize] += irradiance * visibility.abs();
         *match group {
             Group::Light => continue,
             Group::Emitter => &mut row.emitters,
-            _ if renewed => &mut row.own,
+            _ if known => &mut row.own,
             _ => &mut row.inherited,
         } += view * visibility.abs();
     }
-    renewed_here.sort_unstable();
-    let is_own = |sender: u32| renewed_here.binary_search(&sender).is_ok();
+    known_here.sort_unstable();
+    let is_own = |sender: u32| known_here.binary_search(&sender).is_ok();
     let seen = look_around(light, (x, n, element.source), seed, COVER * element.radius, is_own);
     let Correction { inherited, rest, all } = row.correction(&seen);
     let irradiance = own[0] + kept[0] + (own[1] + kept[1] + (own[2] + kept[2] * inherited) * rest) * all;

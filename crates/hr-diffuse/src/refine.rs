@@ -11,11 +11,13 @@ use crate::hierarchy::{Element, Elements, Kind};
 use crate::hooks::LightField;
 use crate::links::Link;
 use crate::oracle::{FactorBounds, factor_bounds};
+use crate::proofs;
 use crate::segments;
 use crate::skips::Skips;
 use crate::stats::Skipped;
 use crate::threads::{self, prelude::*};
 use crate::transport::{Exitant, Light};
+use crate::visibility::Proof;
 use glam::{DVec3, Vec3};
 use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
@@ -78,6 +80,7 @@ pub(crate) struct Tolerance {
 enum Verdict {
     Black,
     Facing,
+    Blocked,
     Unlit,
     Keep(Link),
     /// Keep the link of a larger pair, for want of time.
@@ -167,7 +170,7 @@ pub(crate) fn refine<L: LightField>(
             let stopped = refined.stopped || refined.spent.is_some();
             let decided = part.par_iter().with_min_len(32).map(|candidate| {
                 let inherited = if stopped { inherited(reader, candidate) } else { None };
-                let decided = || decide(reader, candidate.pair, candidate.own(), tolerance, stopped, &counters);
+                let decided = || decide(reader, candidate, tolerance, stopped, &counters);
                 let keep = |link| if candidate.own().is_some() { Verdict::Keep(link) } else { Verdict::Inherit(link) };
                 inherited.map_or_else(decided, keep)
             });
@@ -185,7 +188,8 @@ pub(crate) fn refine<L: LightField>(
         split_elements(light, &wave, &verdicts);
         let elements = &*light.elements;
         let mut next = Vec::new();
-        for (Candidate { pair, link }, verdict) in wave.iter().zip(&verdicts) {
+        for (candidate, verdict) in wave.iter().zip(&verdicts) {
+            let Candidate { pair, link } = candidate;
             let parts = |node: u32| {
                 let e = &elements.nodes[node as usize];
                 e.first_child..e.first_child + e.child_count
@@ -193,6 +197,7 @@ pub(crate) fn refine<L: LightField>(
             match verdict {
                 Verdict::Black => refined.skipped.black_receivers += 1,
                 Verdict::Facing => refined.skipped.facing += 1,
+                Verdict::Blocked => refined.skipped.proved_blocked += 1,
                 Verdict::Unlit => {
                     refined.skipped.unlit_senders += 1;
                     refined.unlit.push(*pair);
@@ -201,7 +206,7 @@ pub(crate) fn refine<L: LightField>(
                     if matches!(verdict, Verdict::Inherit(_)) {
                         refined.coarse.push(*pair);
                     }
-                    refined.skipped.proved_free += u64::from(link.visibility < 0.0);
+                    refined.skipped.proved_free += u64::from(link.visibility < 0.0 && candidate.own().is_none());
                     refined.links.push(*link);
                 }
                 Verdict::SplitReceiver => {
@@ -345,12 +350,12 @@ fn interval<L: LightField>(light: Light<'_, L>, sender: u32, bounds: &FactorBoun
 
 fn decide<L: LightField>(
     light: Light<'_, L>,
-    pair: Pair,
-    old: Option<Link>,
+    candidate: &Candidate,
     tolerance: Tolerance,
     stopped: bool,
     counters: &Counters,
 ) -> Verdict {
+    let pair = candidate.pair;
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
     let skips = tolerance.skips;
     if skips.black_receivers && r.importance <= 0.0 || r.kind == Kind::Light {
@@ -405,7 +410,7 @@ fn decide<L: LightField>(
         let partial = link.visibility > 0.0 && link.visibility < 1.0;
         if partial && stake(link) > tolerance.error { split(choose(light, pair, tolerance, false)) } else { None }
     };
-    if let Some(link) = old {
+    if let Some(link) = candidate.own() {
         return split_by_shadow(&link).unwrap_or(Verdict::Keep(link));
     }
     // A faint link's factor need not be accurate; no later pass renews it.
@@ -424,12 +429,26 @@ fn decide<L: LightField>(
     }
     let near = 2.0 * (r.radius + s.radius) > r.center.distance(s.center);
     let first = if near { NEAR_SEGMENTS } else { FIRST_SEGMENTS };
+    let start = Instant::now();
+    let proof = match candidate.link {
+        _ if !skips.proofs => Proof::Unknown,
+        Some(whole) if whole.visibility < 0.0 => Proof::Free,
+        _ => proofs::prove(light.scene, r, s),
+    };
+    // Whether bent parts face each other at all their factor does not tell, but pairs of points do.
+    let faces = || r.is_flat() && s.is_flat() || segments::any_facing(light, pair.receiver, pair.sender, first);
+    if proof == Proof::Blocked || proof == Proof::Free && faces() {
+        counters.nanoseconds.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        link.visibility = -1.0;
+        return if proof == Proof::Free { Verdict::Keep(link) } else { Verdict::Blocked };
+    }
     let worth = (first as f32 * stake(&link) / tolerance.error) as u32;
     let (mut blocker, mut seen, mut total, mut done) = (u32::MAX, 0.0, 0.0, 0);
     // A few at first: those of a pair that is split then are not missed.
     for segments in [first, worth.clamp(first, MOST_SEGMENTS)] {
         let start = Instant::now();
-        let (free, all, rays) = segments::visibility(light, pair.receiver, pair.sender, done..segments, &mut blocker);
+        let (free, all, rays) =
+            segments::visibility(light, pair.receiver, pair.sender, done..segments, (&proof, &mut blocker));
         counters.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
         counters.nanoseconds.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
         (seen, total, done) = (seen + free, total + all, segments);

@@ -174,7 +174,7 @@ impl<'a> Spots<'a> {
             }
             for place in 0..FIRST_SPOTS {
                 let u: Vec2 = point2(hash(side, 0x59), place);
-                let (at, _, _) = scene.surfaces()[(side / 2) as usize].sample_area(Domain::WHOLE, u.x, u.y);
+                let (at, _) = scene.surfaces()[(side / 2) as usize].sample(Domain::WHOLE, u.x, u.y);
                 let spot = spots.add(side, at, emits(side));
                 spots.join_around(spot, side, at);
             }
@@ -237,7 +237,7 @@ impl<'a> Spots<'a> {
             let (x, n) = if self.large[surface as usize] {
                 (at, outward(geometry, side))
             } else {
-                let (x, normal, _) = geometry.sample_area(Domain::WHOLE, u.x, u.y);
+                let (x, normal) = geometry.sample(Domain::WHOLE, u.x, u.y);
                 (x, if is_back(side) { -normal } else { normal })
             };
             seen.light |= searching && sees_light(scene, surface, x, n, |_| true);

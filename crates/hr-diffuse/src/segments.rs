@@ -6,6 +6,7 @@ use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::sampling::{hash, point2, point4, unit};
 use crate::transport::{Exitant, Light};
+use crate::visibility::Proof;
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
 
@@ -15,6 +16,9 @@ const NEAR: f32 = 2.0;
 const NEAR_LEVELS: u32 = 4;
 /// Radiosities that differ by no more than this share are taken to be the same.
 const EVENLY: f32 = 0.1;
+
+/// How far away distant light is taken to come from: unit space is the unit cube, so that this is outside.
+pub(crate) const DISTANT: f32 = 2.0;
 
 /// A point on a surface below a node.
 #[derive(Clone, Copy, Debug)]
@@ -86,23 +90,28 @@ fn draw(
                 Some(from) => draw_part(geometry, element, from, choice),
                 None => Part { domain: element.domain, area: element.area, rarity: 1.0 },
             };
-            let (at, normal, _) = geometry.sample_area(part.domain, u.x, u.y);
+            let (at, normal) = geometry.sample(part.domain, u.x, u.y);
             let normal = if element.kind == Kind::Back { -normal } else { normal };
             let (surface, area) = (element.source, part.area);
             return Some(Point { at, normal, surface, area, rarity: rarity * part.rarity });
         }
         let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
-        let plain = |child: usize| elements.nodes[child].area * density.of(elements, child);
-        let nearness = |child: usize| {
-            let (at, radius) = (elements.nodes[child].center, elements.nodes[child].radius);
-            from.map_or(1.0, |from| (from.distance_squared(at) + radius * radius).max(1e-20).recip())
+        let nearness = |element: &Element| match from {
+            Some(from) => (from.distance_squared(element.center) + element.radius * element.radius).max(1e-20).recip(),
+            None => 1.0,
         };
-        let weight = |child: usize| plain(child) * nearness(child);
-        let total: f32 = children.clone().map(weight).sum();
-        let even: f32 = children.clone().map(plain).sum();
-        let (child, rest) = pick(children.clone().map(weight), choice, total)?;
+        let (mut even, mut total) = (0.0, 0.0);
+        let mut weights: SmallVec<[f32; 4]> = SmallVec::new();
+        for child in children.clone() {
+            let plain = elements.nodes[child].area * density.of(elements, child);
+            let weight = plain * nearness(&elements.nodes[child]);
+            even += plain;
+            total += weight;
+            weights.push(weight);
+        }
+        let (child, rest) = pick(weights.into_iter(), choice, total)?;
         (node, choice) = ((children.start + child) as u32, rest);
-        rarity *= total / (even * nearness(node as usize)).max(f32::MIN_POSITIVE);
+        rarity *= total / (even * nearness(&elements.nodes[node as usize])).max(f32::MIN_POSITIVE);
     }
 }
 
@@ -123,14 +132,19 @@ fn draw_part(geometry: &Geometry, element: &Element, from: Vec3, mut choice: f32
             break;
         }
         radius *= 0.5;
-        let weigh = |&domain: &Domain| {
+        let (mut even, mut total) = (0.0, 0.0);
+        let domains = geometry.split(drawn.domain);
+        // By part: area, squared distance, weight.
+        let mut parts = [(0.0, 0.0, 0.0); 4];
+        for (part, &domain) in parts.iter_mut().zip(&domains) {
             let (area, apart) = (geometry.area(domain), geometry.point(geometry.middle(domain)).distance_squared(from));
-            (domain, area, apart, area / (apart + radius * radius).max(1e-20))
-        };
-        let parts: SmallVec<[(Domain, f32, f32, f32); 4]> = geometry.split(drawn.domain).iter().map(weigh).collect();
-        let (even, total) = parts.iter().fold((0.0, 0.0), |(even, total), part| (even + part.1, total + part.3));
-        let Some((picked, rest)) = pick(parts.iter().map(|part| part.3), choice, total) else { break };
-        let (domain, area, distance, weight) = parts[picked];
+            let weight = area / (apart + radius * radius).max(1e-20);
+            even += area;
+            total += weight;
+            *part = (area, apart, weight);
+        }
+        let Some((picked, rest)) = pick(parts.iter().map(|part| part.2), choice, total) else { break };
+        let (domain, (area, distance, weight)) = (domains[picked], parts[picked]);
         let rarity = drawn.rarity * total * area / (even * weight).max(f32::MIN_POSITIVE);
         (drawn, apart, choice) = (Part { domain, area, rarity }, distance, rest);
     }
@@ -158,7 +172,7 @@ pub(crate) fn pick(weights: impl Iterator<Item = f32>, choice: f32, total: f32) 
 /// other point looks away.
 const TRIES: u32 = 6;
 
-/// Visibility estimated by the segments of a range: the weight (the transfer's kernel) that is not blocked, that of all,
+/// Visibility estimated by the segments of a range, of which something is proved: the weight (the transfer's kernel) that is not blocked, that of all,
 /// and the number of rays shot. All 0 where no drawn pair faced each other.
 #[must_use]
 pub(crate) fn visibility<L: LightField>(
@@ -166,21 +180,25 @@ pub(crate) fn visibility<L: LightField>(
     receiver: u32,
     sender: u32,
     range: std::ops::Range<u32>,
-    blocker: &mut u32,
+    (proof, blocker): (&Proof, &mut u32),
 ) -> (f32, f32, u32) {
     let seed = hash(receiver, sender);
     let segments =
         range.filter_map(|i| (0..TRIES).find_map(|attempt| segment(light, receiver, sender, (seed, i, attempt))));
-    shoot(light.scene, segments, blocker)
+    shoot(light.scene, segments, (proof, blocker))
 }
 
 /// Shoots segments: the weight that is not blocked, that of all, and the number of rays.
-fn shoot(scene: &SceneData, segments: impl Iterator<Item = Segment>, blocker: &mut u32) -> (f32, f32, u32) {
+fn shoot(
+    scene: &SceneData,
+    segments: impl Iterator<Item = Segment>,
+    (proof, blocker): (&Proof, &mut u32),
+) -> (f32, f32, u32) {
     let (mut seen, mut total, mut rays) = (0.0, 0.0, 0);
     for segment in segments {
         rays += 1;
         total += segment.weight;
-        if !scene.visibility.occluded(segment.from, segment.to, segment.surfaces, blocker) {
+        if !scene.visibility.occluded_given(proof, segment.from, segment.to, segment.surfaces, blocker) {
             seen += segment.weight;
         }
     }
@@ -264,8 +282,7 @@ pub(crate) fn any_facing<L: LightField>(light: Light<'_, L>, receiver: u32, send
 /// End of a segment from `x` toward a light without extent, and the cosine at `x`.
 pub(crate) fn light_segment(scene: &SceneData, light: usize, x: Vec3, n: Vec3) -> (Vec3, f32) {
     match scene.lights[light].kind {
-        // Unit space is the unit cube: two of its lengths away is outside.
-        LightKind::Directional { direction } => (x - direction * 2.0, -direction.dot(n)),
+        LightKind::Directional { direction } => (x - direction * DISTANT, -direction.dot(n)),
         _ => {
             let at = scene.light_positions[light];
             (at, (at - x).normalize_or_zero().dot(n))
@@ -297,7 +314,7 @@ pub(crate) fn visibility_at<L: LightField>(
         between((x, n, surface), &s, s)
     };
     let segments = (0..count).filter_map(|i| (0..TRIES).find_map(|attempt| segment(i, attempt)));
-    let (seen, total, _) = shoot(scene, segments, &mut blocker);
+    let (seen, total, _) = shoot(scene, segments, (&Proof::Unknown, &mut blocker));
     if total > 0.0 { seen / total } else { 0.0 }
 }
 
@@ -362,7 +379,8 @@ mod tests {
         let bright = bright.expect("one of four parts is in the corner") as usize;
         let see = |solver: &Solver| {
             let mut blocker = u32::MAX;
-            let (seen, total, rays) = visibility(solver.light(), floor, ceiling, 0..512, &mut blocker);
+            let (seen, total, rays) =
+                visibility(solver.light(), floor, ceiling, 0..512, (&Proof::Unknown, &mut blocker));
             assert!(rays > 500, "the two face each other: {rays}");
             seen / total
         };
@@ -382,7 +400,8 @@ mod tests {
         for pair in [[floor, part], [part, floor], [floor, ceiling]] {
             let [few, many] = [64, 8192].map(|count| {
                 let mut blocker = u32::MAX;
-                let (seen, total, _) = visibility(solver.light(), pair[0], pair[1], 0..count, &mut blocker);
+                let (seen, total, _) =
+                    visibility(solver.light(), pair[0], pair[1], 0..count, (&Proof::Unknown, &mut blocker));
                 seen / total
             });
             assert!((few - many).abs() < 0.12, "{pair:?}: {few}, {many}");

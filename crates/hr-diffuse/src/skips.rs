@@ -9,6 +9,8 @@ pub(crate) struct Skips {
     pub(crate) facing: bool,
     /// … and those that hardly do, by samples.
     pub(crate) averted: bool,
+    /// Rays where all segments are proved free, and links where all are proved blocked.
+    pub(crate) proofs: bool,
     pub(crate) sealed_sides: bool,
     pub(crate) converged_leaves: bool,
     /// A look from each leaf at links that bring next to nothing.
@@ -20,6 +22,7 @@ impl Skips {
         black_receivers: true,
         facing: true,
         averted: true,
+        proofs: true,
         sealed_sides: true,
         converged_leaves: true,
         faint_links: true,

@@ -53,6 +53,8 @@ pub struct Skipped {
     pub facing: u64,
     /// Links that need no ray: nothing lies between.
     pub proved_free: u64,
+    /// Pairs that need no link: one surface hides all of the sender from all of the receiver.
+    pub proved_blocked: u64,
     /// Sides of surfaces that no light can reach.
     pub sealed_sides: u64,
     /// Leaves whose incident light did not change enough to be reflected anew.
@@ -67,6 +69,7 @@ impl std::ops::AddAssign for Skipped {
         self.unlit_senders += other.unlit_senders;
         self.facing += other.facing;
         self.proved_free += other.proved_free;
+        self.proved_blocked += other.proved_blocked;
         self.sealed_sides += other.sealed_sides;
         self.converged_leaves += other.converged_leaves;
         self.faint_links += other.faint_links;

@@ -91,7 +91,7 @@ fn look(scene: &SceneData, entire: &[bool], side: Side, rays: u32, channel: usiz
     let unlit = scene.lights.iter().all(outside);
     for i in 0..rays {
         let u = point4(hash(side, 0x57ea), i);
-        let (x, normal, _) = scene.surfaces()[surface as usize].sample_area(Domain::WHOLE, u.x, u.y);
+        let (x, normal) = scene.surfaces()[surface as usize].sample(Domain::WHOLE, u.x, u.y);
         let n = if back { -normal } else { normal };
         let direction = cosine_direction(n, u.z, u.w);
         match scene.visibility.first_side(x, direction, f32::MAX, surface) {

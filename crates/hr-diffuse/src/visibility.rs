@@ -7,7 +7,7 @@
 use crate::geometry::{Aabb, Domain, Geometry, Outline};
 use crate::sealed::Side;
 use crate::threads::prelude::*;
-use glam::{Vec2, Vec3, Vec3A, Vec4};
+use glam::{BVec4A, Vec2, Vec3, Vec3A, Vec4};
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
@@ -90,6 +90,31 @@ pub(crate) struct Region {
     pub(crate) heights: [f32; 2],
 }
 
+/// Points up to a height along a normal, for tests of four boxes side by side.
+struct HalfSpace {
+    normal: [Vec4; 3],
+    height: Vec4,
+    /// Indices in [`Node::bounds`] of those that lie lowest along the normal.
+    lowest: [usize; 3],
+}
+
+impl HalfSpace {
+    fn new(normal: Vec3, height: f32) -> Self {
+        Self {
+            normal: normal.to_array().map(Vec4::splat),
+            height: Vec4::splat(height),
+            lowest: [0, 1, 2].map(|axis| 2 * axis + usize::from(normal[axis] < 0.0)),
+        }
+    }
+
+    /// Which of a node's boxes reach into it.
+    #[inline]
+    fn meets(&self, bounds: &[Vec4; 6]) -> BVec4A {
+        let ([a, b, c], [x, y, z]) = (self.normal, self.lowest);
+        (a * bounds[x] + b * bounds[y] + c * bounds[z]).cmple(self.height)
+    }
+}
+
 /// A ray with what slab tests need.
 struct Ray {
     origin: Vec3,
@@ -121,6 +146,31 @@ impl Ray {
         let near = slab(x, 0).max(slab(y, 1)).max(slab(z, 2)).max(Vec4::splat(t_min));
         let far = slab(x ^ 1, 0).min(slab(y ^ 1, 1)).min(slab(z ^ 1, 2)) * SLAB_GROWTH;
         (near, near.cmple(far.min(Vec4::splat(t_max))).bitmask())
+    }
+}
+
+/// A segment, and what of it counts.
+struct Span {
+    from: Vec3,
+    direction: Vec3,
+    length: f32,
+    t_min: f32,
+    t_max: f32,
+    skip: [u32; 2],
+}
+
+impl Span {
+    /// None of segments without length and of those with non-finite ends.
+    #[inline]
+    fn new(from: Vec3, to: Vec3, skip: [u32; 2]) -> Option<Self> {
+        let direction = to - from;
+        let length = direction.length();
+        if !(length > 0.0 && length.is_finite()) {
+            return None;
+        }
+        let trim = (END_TRIM_SHARE * length).clamp(Aabb::ROUNDING, END_TRIM) / length;
+        let (t_min, t_max) = (trim, 1.0 - trim);
+        (t_min < t_max).then_some(Self { from, direction, length, t_min, t_max, skip })
     }
 }
 
@@ -182,28 +232,13 @@ impl Visibility {
     /// Segments without length and with non-finite ends are free.
     #[must_use]
     pub fn occluded(&self, from: Vec3, to: Vec3, skip: [u32; 2], cache: &mut u32) -> bool {
-        let direction = to - from;
-        let length = direction.length();
-        if !(length > 0.0 && length.is_finite()) {
-            return false;
-        }
-        let trim = (END_TRIM_SHARE * length).clamp(Aabb::ROUNDING, END_TRIM) / length;
-        let (t_min, t_max) = (trim, 1.0 - trim);
-        if t_min >= t_max {
-            return false;
-        }
-        let blocks = |surface: u32, primitive: &Primitive| match primitive {
-            Primitive::Polygon(outline) => {
-                surface != skip[0] && surface != skip[1] && outline.intersect(from, direction, t_min, t_max).is_some()
-            }
-            Primitive::Curved => self.curved_blocks(surface, from, direction, length, [t_min, t_max], skip),
-        };
+        let Some(span) = Span::new(from, to, skip) else { return false };
         if let Some(&primitive) = self.primitive_of.get(*cache as usize)
-            && blocks(*cache, &self.primitives[primitive as usize])
+            && self.blocks(primitive, &span)
         {
             return true;
         }
-        let ray = Ray::new(from, direction);
+        let ray = Ray::new(from, span.direction);
         let mut stack: SmallVec<[u32; 64]> = SmallVec::new();
         if !self.nodes.is_empty() {
             stack.push(0);
@@ -211,7 +246,7 @@ impl Visibility {
         while let Some(index) = stack.pop() {
             if index & LEAF == 0 {
                 let node = &self.nodes[index as usize];
-                let (_, mut mask) = ray.enter(node, t_min, t_max);
+                let (_, mut mask) = ray.enter(node, span.t_min, span.t_max);
                 while mask != 0 {
                     stack.push(node.children[mask.trailing_zeros() as usize & 3]);
                     mask &= mask - 1;
@@ -219,10 +254,9 @@ impl Visibility {
                 continue;
             }
             let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
-            for i in first as usize..(first + count) as usize {
-                let surface = self.surfaces[i];
-                if blocks(surface, &self.primitives[i]) {
-                    *cache = surface;
+            for primitive in first..first + count {
+                if self.blocks(primitive, &span) {
+                    *cache = self.surfaces[primitive as usize];
                     return true;
                 }
             }
@@ -230,18 +264,24 @@ impl Visibility {
         false
     }
 
+    /// Whether a primitive blocks a segment.
+    #[inline]
+    fn blocks(&self, primitive: u32, span: &Span) -> bool {
+        let surface = self.surfaces[primitive as usize];
+        match &self.primitives[primitive as usize] {
+            Primitive::Polygon(outline) => {
+                !span.skip.contains(&surface)
+                    && outline.intersect(span.from, span.direction, span.t_min, span.t_max).is_some()
+            }
+            Primitive::Curved => self.curved_blocks(surface, span),
+        }
+    }
+
     /// Whether a surface that is no polygon blocks a segment, with its own ends taken into account.
     #[cold]
-    fn curved_blocks(
-        &self,
-        surface: u32,
-        from: Vec3,
-        direction: Vec3,
-        length: f32,
-        [mut t_min, mut t_max]: [f32; 2],
-        skip: [u32; 2],
-    ) -> bool {
+    fn curved_blocks(&self, surface: u32, span: &Span) -> bool {
         let geometry = &self.geometries[surface as usize];
+        let Span { from, direction, length, mut t_min, mut t_max, skip } = *span;
         if skip.contains(&surface) {
             if geometry.is_flat() {
                 return false;
@@ -341,12 +381,15 @@ impl Visibility {
     }
 
     /// Whether any surface whose box, about, reaches into a region is `wanted`.
-    pub(crate) fn any_in(&self, region: &Region, wanted: impl Fn(u32) -> bool) -> bool {
-        let [low, high] = [region.bounds.min, region.bounds.max].map(|p| p.to_array().map(Vec4::splat));
-        let normal = region.normal.to_array().map(Vec4::splat);
-        let [least, most] = region.heights.map(Vec4::splat);
-        // Indices of the bounds that lie lowest along the normal.
-        let lowest = [0, 1, 2].map(|axis| 2 * axis + usize::from(region.normal[axis] < 0.0));
+    pub(crate) fn any_in(&self, region: &Region, wanted: impl FnMut(u32) -> bool) -> bool {
+        let [least, most] = region.heights;
+        let sides = [HalfSpace::new(region.normal, most), HalfSpace::new(-region.normal, -least)];
+        self.any_within(&region.bounds, &sides, wanted)
+    }
+
+    /// Whether any surface whose box, about, reaches into a box and all of some half-spaces is `wanted`.
+    fn any_within(&self, within: &Aabb, sides: &[HalfSpace], mut wanted: impl FnMut(u32) -> bool) -> bool {
+        let [low, high] = [within.min, within.max].map(|p| p.to_array().map(Vec4::splat));
         let mut stack: SmallVec<[u32; 64]> = SmallVec::new();
         if !self.nodes.is_empty() {
             stack.push(0);
@@ -355,10 +398,11 @@ impl Visibility {
             if index & LEAF == 0 {
                 let Node { bounds, children } = &self.nodes[index as usize];
                 let overlap = |axis: usize| bounds[2 * axis].cmple(high[axis]) & bounds[2 * axis + 1].cmpge(low[axis]);
-                let height =
-                    |[x, y, z]: [usize; 3]| normal[0] * bounds[x] + normal[1] * bounds[y] + normal[2] * bounds[z];
-                let between = height(lowest).cmple(most) & height(lowest.map(|i| i ^ 1)).cmpge(least);
-                let mut mask = (overlap(0) & overlap(1) & overlap(2) & between).bitmask();
+                let mut met = overlap(0) & overlap(1) & overlap(2);
+                for side in sides {
+                    met &= side.meets(bounds);
+                }
+                let mut mask = met.bitmask();
                 while mask != 0 {
                     stack.push(children[mask.trailing_zeros() as usize & 3]);
                     mask &= mask - 1;
@@ -491,5 +535,8 @@ impl Groups {
     }
 }
 
+mod shaft;
 #[cfg(test)]
 mod tests;
+
+pub(crate) use shaft::{End, MOST_LISTED, Proof, Shaft};

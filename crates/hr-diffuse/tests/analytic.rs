@@ -180,3 +180,57 @@ fn the_darkness_behind_a_picture_stays_there() {
         }
     }
 }
+
+/// A room whose ceiling shines, with boxes in it.
+fn room(boxes: &[(DVec3, DVec3)]) -> SceneInput {
+    let mut surfaces = cube(2.0);
+    surfaces[5].material = 1;
+    for (i, &(center, size)) in boxes.iter().enumerate() {
+        let turn = glam::DMat3::from_rotation_z(0.4 + i as f64);
+        surfaces.extend(cube(1.0).into_iter().map(|surface| {
+            let Shape::Quad(corners) = surface.shape else { panic!("a cube's faces") };
+            let [a, b, c, d] = corners.map(|p| center + turn * (p * size));
+            Surface::new(Shape::Quad([d, c, b, a]), 0)
+        }));
+    }
+    let wall = DiffuseMaterial { reflectance: Rgb::splat(0.5), exitance: Rgb::ZERO, two_sided: false };
+    let lamp = DiffuseMaterial { exitance: Rgb::ONE, ..wall };
+    SceneInput { surfaces, materials: vec![wall, lamp], ..SceneInput::default() }
+}
+
+#[test]
+fn an_empty_room_needs_no_visibility_rays() {
+    let solution = solve(&room(&[]), 0.05);
+    assert!(solution.links.all().len() > 100, "there are links");
+    assert!(solution.links.all().iter().all(|link| link.visibility < 0.0), "all are proved free");
+    assert_eq!((solution.stats.rays, solution.stats.vertex_rays), (0, 0), "no rays");
+}
+
+#[test]
+fn no_ray_contradicts_a_proof() {
+    let boxes = [
+        (DVec3::new(-0.4, 0.3, -0.6), DVec3::new(0.5, 0.4, 0.8)),
+        (DVec3::new(0.5, -0.4, -0.2), DVec3::new(0.3, 0.5, 0.2)),
+        (DVec3::new(0.2, 0.6, 0.1), DVec3::new(0.02, 0.5, 0.9)),
+    ];
+    let solution = solve(&room(&boxes), 0.1);
+    let (surfaces, visibility) = (solution.scene.surfaces(), &solution.scene.visibility);
+    let (mut proved, mut contradicted) = (0, 0);
+    for link in solution.links.all().iter().filter(|link| link.visibility < 0.0) {
+        let [r, s] = [link.receiver, link.sender].map(|node| &solution.elements.nodes[node as usize]);
+        if !(r.is_patch() && s.is_patch()) {
+            continue;
+        }
+        proved += 1;
+        for i in 0..64 {
+            let u = hr_diffuse::sampling::point4(link.receiver ^ link.sender.rotate_left(16), i);
+            let from = surfaces[r.source as usize].sample_area(r.domain, u.x, u.y).0;
+            let to = surfaces[s.source as usize].sample_area(s.domain, u.z, u.w).0;
+            let facing = (to - from).dot(r.normals.axis) > 0.0 && (from - to).dot(s.normals.axis) > 0.0;
+            contradicted += u32::from(facing && visibility.occluded(from, to, [r.source, s.source], &mut { u32::MAX }));
+        }
+    }
+    let links = solution.links.all().len();
+    assert!(2 * proved > links, "{proved} of {links} links are proved free");
+    assert_eq!(contradicted, 0, "segments are blocked that are proved free");
+}

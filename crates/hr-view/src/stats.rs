@@ -62,6 +62,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "unlit_senders": skipped.unlit_senders,
             "facing": skipped.facing,
             "proved_free": skipped.proved_free,
+            "proved_blocked": skipped.proved_blocked,
             "sealed_sides": skipped.sealed_sides,
             "converged_leaves": skipped.converged_leaves,
             "faint_links": skipped.faint_links,

@@ -32,14 +32,32 @@ impl Geometry {
 
     /// The least and the greatest coordinate of a polygon's corners along a direction; `None` for other surfaces.
     pub(crate) fn heights(&self, direction: Vec3) -> Option<[f32; 2]> {
-        let of = |points: &[Vec3]| {
-            let each = points.iter().map(|p| p.dot(direction));
-            each.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], height| [low.min(height), high.max(height)])
-        };
+        let each = self.polygon()?.iter().map(|p| p.dot(direction));
+        Some(each.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], height| [low.min(height), high.max(height)]))
+    }
+
+    /// The corners of a polygon.
+    pub(crate) fn polygon(&self) -> Option<&[Vec3]> {
         match self {
-            Self::Triangle(triangle) => Some(of(triangle.points())),
-            Self::Quad(quad) => Some(of(quad.points())),
+            Self::Triangle(triangle) => Some(triangle.points()),
+            Self::Quad(quad) => Some(quad.points()),
             Self::Revolution(_) => None,
+        }
+    }
+
+    /// The least coordinate of the whole surface along a unit direction.
+    #[inline]
+    pub(crate) fn lowest(&self, direction: Vec3) -> f32 {
+        match self {
+            Self::Triangle(triangle) => {
+                let [a, b, c] = triangle.points().map(|p| p.dot(direction));
+                a.min(b).min(c)
+            }
+            Self::Quad(quad) => {
+                let [a, b, c, d] = quad.points().map(|p| p.dot(direction));
+                a.min(b).min(c.min(d))
+            }
+            Self::Revolution(revolution) => revolution.lowest(direction),
         }
     }
 

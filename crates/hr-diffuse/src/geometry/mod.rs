@@ -185,18 +185,23 @@ impl Geometry {
     /// map can be made to keep areas (all but the torus and quadrilaterals that are no parallelograms).
     #[must_use]
     pub fn sample_area(&self, domain: Domain, s: f32, t: f32) -> (Vec3, Vec3, f32) {
+        let (point, normal) = self.sample(domain, s, t);
+        let weight = match self {
+            Self::Triangle(_) => self.area(domain),
+            Self::Quad(quad) => quad.jacobian(domain.lerp(s, t)) * domain.rectangle(),
+            Self::Revolution(revolution) => revolution.sample_weight(domain, revolution.sample(domain, s, t)),
+        };
+        (point, normal, weight)
+    }
+
+    /// Point and normal of [`sample_area`](Self::sample_area) alone, for where areas are kept or the difference does not
+    /// matter.
+    #[must_use]
+    pub fn sample(&self, domain: Domain, s: f32, t: f32) -> (Vec3, Vec3) {
         match self {
-            Self::Triangle(_) => {
-                (self.point(self.domain_point(domain, s, t)), self.normal(Vec2::ZERO), self.area(domain))
-            }
-            Self::Quad(quad) => {
-                let uv = domain.lerp(s, t);
-                (quad.point(uv), quad.normal(), quad.jacobian(uv) * domain.rectangle())
-            }
-            Self::Revolution(revolution) => {
-                let (uv, weight) = revolution.sample(domain, s, t);
-                (revolution.point(uv), revolution.normal(uv), weight)
-            }
+            Self::Triangle(triangle) => (triangle.point(self.domain_point(domain, s, t)), triangle.normal()),
+            Self::Quad(quad) => (quad.point(domain.lerp(s, t)), quad.normal()),
+            Self::Revolution(revolution) => revolution.point_and_normal(revolution.sample(domain, s, t)),
         }
     }
 

@@ -189,6 +189,17 @@ impl Revolution {
         self.frame[2]
     }
 
+    /// The least coordinate of the whole surface along a unit direction.
+    pub(super) fn lowest(&self, direction: Vec3) -> f32 {
+        let along = direction.dot(self.axis());
+        let across = (1.0 - along * along).max(0.0).sqrt();
+        let below = match self.profile {
+            Profile::Line { from, to } => (along * from.y - across * from.x).min(along * to.y - across * to.x),
+            Profile::Arc { center, radius, .. } => -across * center - radius,
+        };
+        direction.dot(self.center) + below
+    }
+
     pub(super) fn is_flat(&self) -> bool {
         matches!(self.profile, Profile::Line { from, to } if from.y == to.y)
     }
@@ -236,14 +247,26 @@ impl Revolution {
     }
 
     pub(super) fn normal(&self, uv: Vec2) -> Vec3 {
-        let (radial, axial) = match self.profile {
+        self.point_and_normal(uv).1
+    }
+
+    /// Both at the cost of one.
+    pub(super) fn point_and_normal(&self, uv: Vec2) -> (Vec3, Vec3) {
+        let (profile, (radial, axial)) = match self.profile {
             Profile::Line { from, to } => {
                 let along = (to - from).normalize();
-                (along.y, -along.x)
+                (self.profile_point(uv.y), (along.y, -along.x))
             }
-            Profile::Arc { .. } => cos_sin_turns(self.profile_normal(uv.y)),
+            Profile::Arc { center, radius, .. } => {
+                let (cos, sin) = cos_sin_turns(self.profile_normal(uv.y));
+                (vec2(center + radius * cos, radius * sin), (cos, sin))
+            }
         };
-        self.turn(uv.x, self.side * radial, self.side * axial)
+        let [x, y, z] = self.frame;
+        let (cos, sin) = cos_sin_turns(uv.x);
+        let away = x * cos + y * sin;
+        let point = self.center + (away * profile.x + z * profile.y);
+        (point, away * (self.side * radial) + z * (self.side * axial))
     }
 
     pub(super) fn jacobian(&self, uv: Vec2) -> f32 {
@@ -308,8 +331,8 @@ impl Revolution {
         TAU * (u1 - u0) * integral
     }
 
-    /// Parameters in a part for two numbers in 0…1, and the area they stand for.
-    pub(super) fn sample(&self, domain: Domain, s: f32, t: f32) -> (Vec2, f32) {
+    /// Parameters in a part for two numbers in 0…1.
+    pub(super) fn sample(&self, domain: Domain, s: f32, t: f32) -> Vec2 {
         let Domain { v0, v1, .. } = domain;
         let uv = domain.lerp(s, t);
         let v = match self.profile {
@@ -327,9 +350,17 @@ impl Revolution {
                 let sine = (a + (b - a) * f64::from(t)).clamp(0.0, 1.0).sqrt();
                 ((sine.asin() / (0.5 * std::f64::consts::PI)) as f32).clamp(v0, v1)
             }
-            Profile::Arc { .. } => return (uv, self.jacobian(uv) * domain.rectangle()),
+            Profile::Arc { .. } => uv.y,
         };
-        (vec2(uv.x, v), self.domain_area(domain))
+        vec2(uv.x, v)
+    }
+
+    /// The area that parameters of [`sample`](Self::sample) stand for.
+    pub(super) fn sample_weight(&self, domain: Domain, uv: Vec2) -> f32 {
+        match self.profile {
+            Profile::Arc { center, .. } if center != 0.0 => self.jacobian(uv) * domain.rectangle(),
+            _ => self.domain_area(domain),
+        }
     }
 
     pub(super) fn domain_bounds(&self, domain: Domain) -> Aabb {

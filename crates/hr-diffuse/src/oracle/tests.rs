@@ -83,7 +83,7 @@ fn bounds_hold_what_they_bound() {
             for _ in 0..4 {
                 let part = elements.nodes[points[numbers.below(points.len() as u32) as usize] as usize];
                 let geometry = &scene.surfaces()[part.source as usize];
-                let (x, front, _) = geometry.sample_area(part.domain, numbers.next(), numbers.next());
+                let (x, front) = geometry.sample(part.domain, numbers.next(), numbers.next());
                 // Where nothing is to pass, nothing arrives at the surface itself; else a bent receiver is the plane that
                 // faces the sender.
                 let n = match bounds {

@@ -1,8 +1,9 @@
 //! Against testing every surface, against walls without gaps, and on scenes that trees do not like.
 
-use super::{NO_BLOCKER, Visibility};
+use super::{End, MOST_LISTED, NO_BLOCKER, Proof, Shaft, Visibility};
 use crate::geometry::tests::{geometry, surface};
-use crate::geometry::{Domain, Geometry};
+use crate::geometry::{Aabb, Domain, Geometry};
+use crate::sampling::point4;
 use crate::{Shape, Surface};
 use glam::{DVec3, Vec3, dvec3, vec2, vec3};
 use proptest::prelude::*;
@@ -272,4 +273,75 @@ fn walls_do_not_leak_from_afar() {
             assert!(blocked(&visibility, eye, 2.0 * target - eye), "from {eye} through {target}");
         }
     }
+}
+
+fn triangle([a, b, c]: [Vec3; 3]) -> End {
+    End::polygon(&[a, b, c], (b - a).cross(c - a).normalize_or(Vec3::Z))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(256))]
+
+    /// Proofs hold for every segment between points that face each other.
+    #[test]
+    fn what_is_proved_holds_for_all_segments(
+        surfaces in prop::collection::vec(surface(), 1..12),
+        corners in prop::array::uniform6(end()),
+        size in prop::sample::select(vec![0.01f32, 0.1, 0.4]),
+        boxed in prop::bool::ANY,
+        seed in 0u32..1000,
+    ) {
+        let geometries: Vec<Geometry> = surfaces.iter().map(geometry).collect();
+        let visibility = Visibility::new(&geometries);
+        let [a, b, c, d, e, f] = corners;
+        let shrunk = |a: Vec3, b: Vec3, c: Vec3, size: f32| [a, a + (b - a) * size, a + (c - a) * size];
+        let [from, to] = [shrunk(a, b, c, size), shrunk(d, e, f, size)];
+        let normals = [from, to].map(|[a, b, c]| (b - a).cross(c - a));
+        prop_assume!(normals.iter().all(|normal| normal.length() > 1e-9));
+        let ends = |[from, to]: [[Vec3; 3]; 2]| {
+            let to = if boxed { End::within(Aabb::of_points(to)) } else { triangle(to) };
+            Shaft::new([triangle(from), to])
+        };
+        let own = [NO_BLOCKER; 2];
+        let proof = visibility.prove(&ends([from, to]), own, MOST_LISTED);
+        let point = |[a, b, c]: [Vec3; 3], s: f32, t: f32| {
+            let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
+            a + (b - a) * s + (c - a) * t
+        };
+        for i in 0..32 {
+            // Off the edges, where touching surfaces hide what their rounding decides.
+            let u = point4(seed, i) * 0.98 + 0.01;
+            let (p, q) = (point(from, u.x, u.y), point(to, u.z, u.w));
+            let along = (q - p).normalize_or_zero();
+            let before = along.dot(normals[0].normalize()) > 1e-3;
+            if before && (boxed || along.dot(normals[1].normalize()) < -1e-3) {
+                let mut blocker = NO_BLOCKER;
+                let hit = visibility.occluded(p, q, own, &mut blocker);
+                let given = visibility.occluded_given(&proof, p, q, own, &mut { NO_BLOCKER });
+                prop_assert_eq!(given, hit, "{} to {} meets {}, but {:?}", p, q, blocker, &proof);
+            }
+        }
+    }
+}
+
+#[test]
+fn shafts_of_walls_and_rooms() {
+    let wall = |x: f64| Shape::Quad([dvec3(x, 0.0, 0.0), dvec3(x, 1.0, 0.0), dvec3(x, 1.0, 1.0), dvec3(x, 0.0, 1.0)]);
+    let patch = |x: f32, low: f32, high: f32, normal: Vec3| {
+        End::polygon(&[vec3(x, low, low), vec3(x, high, low), vec3(x, high, high), vec3(x, low, high)], normal)
+    };
+    let visibility = scene([wall(0.0), wall(0.5), wall(1.0)]);
+    let own = [0, 2];
+    let shaft = |a: f32, b: f32, high: f32| Shaft::new([patch(a, 0.1, 0.4, Vec3::X), patch(b, 0.2, high, Vec3::NEG_X)]);
+    let prove = |a: f32, b: f32, high: f32| visibility.prove(&shaft(a, b, high), own, MOST_LISTED);
+    assert_eq!(prove(0.0, 1.0, 0.9), Proof::Blocked, "a wall between");
+    assert_eq!(prove(0.0, 0.5, 0.9), Proof::Free, "up to the wall");
+    let known = prove(0.0, 1.0, 2.5);
+    assert_eq!(known, Proof::Among(smallvec::smallvec![1]), "some pass beside it");
+    assert_eq!(visibility.prove(&shaft(0.0, 1.0, 2.5), own, 0), Proof::Unknown, "more than what may be listed");
+    let beside = Shaft::new([patch(0.0, 2.1, 2.2, Vec3::X), patch(1.0, 2.2, 2.9, Vec3::NEG_X)]);
+    assert_eq!(visibility.prove(&beside, own, MOST_LISTED), Proof::Free, "beside the wall");
+    // What is behind either end is not between them.
+    let averted = Shaft::new([patch(0.0, 0.1, 0.4, Vec3::NEG_X), patch(1.0, 0.2, 0.9, Vec3::NEG_X)]);
+    assert_eq!(visibility.prove(&averted, own, MOST_LISTED), Proof::Free, "no segment faces both");
 }

@@ -1,0 +1,39 @@
+//! What is proved of the light between two nodes before any ray is shot.
+
+use crate::LightKind;
+use crate::geometry::Aabb;
+use crate::hierarchy::{Element, Kind, SceneData};
+use crate::segments::DISTANT;
+use crate::visibility::{End, MOST_LISTED, NO_BLOCKER, Proof, Shaft};
+use glam::Vec3;
+use smallvec::SmallVec;
+
+/// What is proved of all segments between points of two nodes that face each other. What of clusters hides the rest of them
+/// is not looked into: of these only that nothing is between can be proved, or that one surface hides all.
+pub(crate) fn prove(scene: &SceneData, receiver: &Element, sender: &Element) -> Proof {
+    let target = end(scene, receiver);
+    let source = match sender.kind {
+        Kind::Light => match scene.lights[sender.source as usize].kind {
+            LightKind::Directional { direction } => target.shifted(direction * -DISTANT),
+            _ => End::point(sender.center),
+        },
+        _ => end(scene, sender),
+    };
+    // Surfaces that cannot hide their own points from what these face.
+    let own = |element: &Element| if element.is_patch() && element.convex { element.source } else { NO_BLOCKER };
+    let clusters = receiver.kind == Kind::Cluster || sender.kind == Kind::Cluster;
+    let most = if clusters { 0 } else { MOST_LISTED };
+    scene.visibility.prove(&Shaft::new([target, source]), [own(receiver), own(sender)], most)
+}
+
+fn end(scene: &SceneData, element: &Element) -> End {
+    if element.is_patch() {
+        let geometry = &scene.surfaces()[element.source as usize];
+        if geometry.is_polygon() {
+            let corners: SmallVec<[Vec3; 4]> =
+                geometry.corners(element.domain).into_iter().map(|uv| geometry.point(uv)).collect();
+            return End::polygon(&corners, element.normals.axis);
+        }
+    }
+    End::within(Aabb { min: element.bounds[0], max: element.bounds[1] })
+}
