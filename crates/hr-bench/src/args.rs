@@ -28,6 +28,8 @@ pub enum Command {
     Growth(GrowthArgs),
     /// One solve on 1, 2 and all threads, and whether the results are the same bits: a Markdown table
     Threads(ThreadsArgs),
+    /// Gathering against shooting: a Markdown table
+    Transport(TransportArgs),
     /// Form factors against closed forms and brute force: a Markdown table
     FormFactors(FormFactorArgs),
     /// Rays per second on one thread: a Markdown table
@@ -192,6 +194,18 @@ pub struct ThreadsArgs {
     /// Error to ask for
     #[arg(long, value_name = "E", default_value_t = 0.05)]
     pub error: f32,
+}
+
+/// Of `hr-bench transport`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct TransportArgs {
+    /// Scene files or names of built-in scenes; all built-in ones where none is given
+    #[arg(value_name = "SCENE")]
+    pub scenes: Vec<String>,
+
+    /// Errors to ask for
+    #[arg(long, value_name = "E,E,...", value_delimiter = ',', default_value = "0.15")]
+    pub errors: Vec<f32>,
 }
 
 /// Of `hr-bench form-factors`.

@@ -9,6 +9,7 @@
 //! | `curve` | the diffuse solver's error over its time, against reference irradiances and its own finest solution |
 //! | `growth` | time and memory of generated scenes over their size |
 //! | `threads` | what more threads bring, and that they change nothing |
+//! | `transport` | gathering against shooting |
 //! | `form-factors` | form factors against closed forms and brute force |
 //! | `visibility` | rays per second |
 //! | `paper` | what the paper's tables and figures compare |
@@ -29,6 +30,7 @@ pub mod paper;
 pub mod plot;
 pub mod run;
 pub mod threads;
+pub mod transport;
 pub mod views;
 pub mod visibility;
 

@@ -313,6 +313,7 @@ impl Stats {
             vertex_rays,
             pairs,
             iterations,
+            links_evaluated,
             ref residuals,
             stopped,
             spent,
@@ -328,24 +329,54 @@ impl Stats {
             sealed_sides,
             converged_leaves,
             faint_links,
+            shot_links,
         } = skipped;
         let spent = match spent {
             None => 0_u64,
             Some(Spent::Time) => 1,
             Some(Spent::Memory) => 2,
         };
-        out.put(&[polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations.into(), bytes])?;
+        out.put(&[
+            polygons,
+            nodes,
+            leaves,
+            links,
+            rays,
+            vertex_rays,
+            pairs,
+            iterations.into(),
+            links_evaluated,
+            bytes,
+        ])?;
         out.put(&[stopped.into(), spent])?;
-        out.put(&[black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves, faint_links])?;
+        out.put(&[
+            black_receivers,
+            unlit_senders,
+            facing,
+            proved_free,
+            sealed_sides,
+            converged_leaves,
+            faint_links,
+            shot_links,
+        ])?;
         out.put(residuals)
     }
 
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
-        let [polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations, bytes] = from.take_exactly(WHAT)?;
-        let [stopped, spent] = from.take_exactly::<u64, 2>(WHAT)?;
-        let [black_receivers, unlit_senders, facing, proved_free, sealed_sides, converged_leaves, faint_links] =
+        let [polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations, links_evaluated, bytes] =
             from.take_exactly(WHAT)?;
+        let [stopped, spent] = from.take_exactly::<u64, 2>(WHAT)?;
+        let [
+            black_receivers,
+            unlit_senders,
+            facing,
+            proved_free,
+            sealed_sides,
+            converged_leaves,
+            faint_links,
+            shot_links,
+        ] = from.take_exactly(WHAT)?;
         Ok(Self {
             polygons,
             nodes,
@@ -354,6 +385,7 @@ impl Stats {
             rays,
             vertex_rays,
             pairs,
+            links_evaluated,
             iterations: u64::try_into(iterations).map_err(|_| FlatError::Misfit(WHAT))?,
             residuals: from.take(WHAT)?,
             stopped: stopped != 0,
@@ -372,6 +404,7 @@ impl Stats {
                 sealed_sides,
                 converged_leaves,
                 faint_links,
+                shot_links,
             },
             seconds: Seconds::default(),
         })

@@ -22,6 +22,8 @@ pub struct Stats {
     pub pairs: u64,
     /// Iterations (gather, push, reflect, pull).
     pub iterations: u32,
+    /// Links that light was sent over, each counted in every iteration that did so.
+    pub links_evaluated: u64,
     /// Change of the mean radiosity by each iteration, relative to its value.
     pub residuals: Vec<f32>,
     /// Whether it was told to stop before it was done: the solution is what there was by then.
@@ -54,6 +56,8 @@ pub struct Skipped {
     pub converged_leaves: u64,
     /// Links that bring so little that leaves do not look for themselves what they bring there.
     pub faint_links: u64,
+    /// Links over which nothing was shot in an iteration, as their senders had next to no unshot light.
+    pub shot_links: u64,
 }
 
 impl std::ops::AddAssign for Skipped {
@@ -65,6 +69,7 @@ impl std::ops::AddAssign for Skipped {
         self.sealed_sides += other.sealed_sides;
         self.converged_leaves += other.converged_leaves;
         self.faint_links += other.faint_links;
+        self.shot_links += other.shot_links;
     }
 }
 
