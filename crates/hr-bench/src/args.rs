@@ -32,6 +32,8 @@ pub enum Command {
     Transport(TransportArgs),
     /// Form factors against closed forms and brute force: a Markdown table
     FormFactors(FormFactorArgs),
+    /// How tight the oracle's bounds of form factors are: a Markdown table
+    Bounds(BoundsArgs),
     /// Rays per second on one thread: a Markdown table
     Visibility(VisibilityArgs),
     /// The paper's tables 1 to 4 and figures 4 and 7, made anew: a Markdown page with pictures
@@ -214,6 +216,18 @@ pub struct FormFactorArgs {
     /// Samples of brute force
     #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = clap::value_parser!(u32).range(1..))]
     pub samples: u32,
+}
+
+/// Of `hr-bench bounds`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct BoundsArgs {
+    /// Scene files or names of built-in scenes
+    #[arg(value_name = "SCENE", default_values = ["cornell", "glossy-sphere", "room"])]
+    pub scenes: Vec<String>,
+
+    /// Pairs of elements of each kind and distance, from each scene
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub pairs: u32,
 }
 
 /// Of `hr-bench visibility`.

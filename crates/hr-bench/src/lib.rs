@@ -11,12 +11,14 @@
 //! | `threads` | what more threads bring, and that they change nothing |
 //! | `transport` | gathering against shooting |
 //! | `form-factors` | form factors against closed forms and brute force |
+//! | `bounds` | how tight the oracle's bounds are |
 //! | `visibility` | rays per second |
 //! | `paper` | what the paper's tables and figures compare |
 //! | `view` | time of frames along a walk |
 
 pub mod accuracy;
 pub mod args;
+pub mod bounds;
 pub mod compare;
 pub mod curve;
 pub mod error;
