@@ -96,13 +96,14 @@ fn stopping_does_not_darken() {
         (solver.exitant().irradiance[0].element_sum(), solver.finish(&mut |_| ControlFlow::Break(())))
     };
     let (whole, _) = stopped_at(1.0);
-    // While the last links shoot: at the beginning, and after one, two and three iterations.
+    // Before the last links shoot, at their first iteration, and after one and two.
     for latest in [0.79, 0.801, 0.821, 0.834] {
         let (light, solution) = stopped_at(latest);
         assert!(solution.stats.stopped, "stopped after {latest}");
         assert!((light / whole - 1.0).abs() < ERROR, "{latest}: {light} W/m² instead of {whole}");
         let samples: usize = solution.incident.iter().map(Vec::len).sum();
-        assert!(samples > 100, "{latest}: {samples} samples of what was shot");
+        // That of the lamps is shot first.
+        assert!(samples > 0, "{latest}: no sample of what was shot");
     }
 }
 

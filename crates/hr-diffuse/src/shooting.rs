@@ -121,35 +121,39 @@ fn diffuse<L: LightField>(light: Light<'_, L>, node: usize) -> Rgb {
 }
 
 impl<L: LightField> Solver<L> {
-    /// Begins to shoot all the light that there is; where the extension is to reflect it, that is what surfaces emit. Tells
-    /// whether it is.
-    pub(crate) fn begin_shooting(&mut self, reflects: bool) -> bool {
+    /// Begins to shoot all the light that there is; where the extension is to reflect it, that is what surfaces emit. Then
+    /// returns the extension's exitant light before.
+    pub(crate) fn begin_shooting(&mut self, reflects: bool) -> Option<Vec<L::Exitant>> {
         if self.settings.transport != Transport::Shoot {
-            return false;
+            return None;
         }
-        let begins_dark = reflects && self.elements.nodes[0].active;
+        let mut reflected = None;
         let nodes = self.elements.nodes.len();
         let mut shot = Shot::nothing(nodes, self.links.all().len());
-        if begins_dark {
+        if reflects && self.elements.nodes[0].active {
             shot.before = std::mem::replace(&mut self.exitant.irradiance, vec![Rgb::ZERO; nodes]);
-            self.exitant.gain.fill(1.0);
-            self.exitant.peak.fill(0.0);
-            self.reflected.fill_with(L::Exitant::default);
-            self.brightest.clear();
+            let none = std::iter::repeat_with(L::Exitant::default).take(nodes).collect();
+            reflected = Some(std::mem::replace(&mut self.reflected, none));
             self.pull();
         }
         self.shot = Some(shot);
-        begins_dark
+        reflected
     }
 
-    /// Ends it: the extension gets all that was shot, and reflects it once. Light that did not settle is no less than it was before.
+    /// Ends it: the extension gets all that was shot, and reflects it once. Light that did not settle is no less than it was
+    /// before; where nothing was shot, `reflected` is what the extension had made before.
     pub(crate) fn finish_shooting(
         &mut self,
         reflects: bool,
         settled: bool,
+        reflected: Option<Vec<L::Exitant>>,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) {
         let Some(shot) = self.shot.take().filter(|_| self.elements.nodes[0].active) else { return };
+        if let Some(reflected) = reflected {
+            (self.exitant.irradiance, self.reflected) = (shot.before, reflected);
+            return self.pull();
+        }
         if !settled {
             for (now, before) in self.exitant.irradiance.iter_mut().zip(&shot.before) {
                 *now = now.max(*before);

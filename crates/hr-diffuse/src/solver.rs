@@ -271,7 +271,7 @@ impl<L: LightField> Solver<L> {
             self.prepare(false, whole);
             self.begin_shooting(false);
             self.iterate(false, whole);
-            self.finish_shooting(false, false, whole);
+            self.finish_shooting(false, false, None, whole);
         }
         self.measure();
         self.stats.stopped = stopped;
@@ -312,9 +312,12 @@ impl<L: LightField> Solver<L> {
         let (last, reflects) = (pass == LAST_PASS, pass >= FIRST_REFLECTED);
         let goal = if last { CONVERGED_SHARE * self.settings.error } else { self.settings.error };
         let account = self.account;
-        let begins_dark = self.begin_shooting(reflects);
+        if *stopped {
+            return;
+        }
+        let mut before = self.begin_shooting(reflects);
         let mut settled = false;
-        for iteration in 0..if last || begins_dark { MOST_ITERATIONS } else { 3 } {
+        for iteration in 0..if last || before.is_some() { MOST_ITERATIONS } else { 3 } {
             let fraction = progress_fraction(pass, 0.8 + 0.2 * (iteration as f32 / (iteration as f32 + 4.0)));
             let progress = self.progress(Phase::Transport, fraction, PASSES[pass]);
             let ask = &mut || {
@@ -322,6 +325,7 @@ impl<L: LightField> Solver<L> {
                 if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
             let Some(residual) = self.iterate(reflects, ask) else { break };
+            before = None;
             if self.grows() {
                 self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
             }
@@ -331,7 +335,7 @@ impl<L: LightField> Solver<L> {
             }
         }
         let progress = self.progress(Phase::Transport, progress_fraction(pass, 1.0), PASSES[pass]);
-        self.finish_shooting(reflects, settled, &mut || {
+        self.finish_shooting(reflects, settled, before, &mut || {
             *stopped = *stopped || watch(&progress).is_break();
             if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
