@@ -7,3 +7,4 @@ mod furnace;
 mod hooks;
 mod invariance;
 mod scenes;
+mod shooting;

@@ -154,7 +154,7 @@ fn random_scenes_are_refused_or_solved() {
         let error = source.of(&[1.0, 0.5, 0.2, 0.05]);
         let memory = source.of(&[None, None, Some(0), Some(100_000), Some(u64::MAX)]);
         let time = source.of(&[None, None, Some(Duration::ZERO), Some(Duration::from_millis(20)), Some(Duration::MAX)]);
-        let settings = Settings { error, budget: Budget { time, memory } };
+        let settings = Settings { budget: Budget { time, memory }, ..Settings::with_error(error) };
         let Some((input, mut solver)) = mended(source.scene(), settings) else { continue };
         let mut calls = 0;
         let mut watch = |_: &Progress| {

@@ -28,8 +28,12 @@ pub enum Command {
     Growth(GrowthArgs),
     /// One solve on 1, 2 and all threads, and whether the results are the same bits: a Markdown table
     Threads(ThreadsArgs),
+    /// Gathering against shooting: a Markdown table
+    Transport(TransportArgs),
     /// Form factors against closed forms and brute force: a Markdown table
     FormFactors(FormFactorArgs),
+    /// How tight the oracle's bounds of form factors are: a Markdown table
+    Bounds(BoundsArgs),
     /// Rays per second on one thread, and links that need none: Markdown tables
     Visibility(VisibilityArgs),
     /// The paper's tables 1 to 4 and figures 4 and 7, made anew: a Markdown page with pictures
@@ -194,12 +198,36 @@ pub struct ThreadsArgs {
     pub error: f32,
 }
 
+/// Of `hr-bench transport`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct TransportArgs {
+    /// Scene files or names of built-in scenes; all built-in ones where none is given
+    #[arg(value_name = "SCENE")]
+    pub scenes: Vec<String>,
+
+    /// Errors to ask for
+    #[arg(long, value_name = "E,E,...", value_delimiter = ',', default_value = "0.15")]
+    pub errors: Vec<f32>,
+}
+
 /// Of `hr-bench form-factors`.
 #[derive(Clone, Debug, PartialEq, Args)]
 pub struct FormFactorArgs {
     /// Samples of brute force
     #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = clap::value_parser!(u32).range(1..))]
     pub samples: u32,
+}
+
+/// Of `hr-bench bounds`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct BoundsArgs {
+    /// Scene files or names of built-in scenes
+    #[arg(value_name = "SCENE", default_values = ["cornell", "glossy-sphere", "room"])]
+    pub scenes: Vec<String>,
+
+    /// Pairs of elements of each kind and distance, from each scene
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub pairs: u32,
 }
 
 /// Of `hr-bench visibility`.

@@ -12,7 +12,7 @@ use crate::irradiance::{self, Agreement};
 use crate::measure::{Cost, Extent, solve};
 use crate::plot::{Line, svg};
 use crate::run::{Out, say};
-use hr_diffuse::{Rgb, SceneInput, Solution};
+use hr_diffuse::{LightField, Rgb, SceneInput, Solution};
 use hr_scene::Scene;
 use std::path::Path;
 use std::sync::Arc;
@@ -116,17 +116,18 @@ fn measure(
         }
     }
     let reference = reference.map(|reference| irradiance::compare(&solution, reference)).transpose()?;
-    Ok(Point { asked, cost, sides: sides(&solution), reference, finest: None })
+    let sides = sides(&solution, &solution.exitant.radiosity);
+    Ok(Point { asked, cost, sides, reference, finest: None })
 }
 
-/// Mean radiosity and area (unit space) of every side of a surface that is no emitter.
-fn sides(solution: &Solution) -> Vec<(f64, Rgb)> {
+/// Mean of a quantity by node, and area (unit space), of every side of a surface that is no emitter.
+pub(crate) fn sides<L: LightField>(solution: &Solution<L>, quantity: &[Rgb]) -> Vec<(f64, Rgb)> {
     let mut sides = Vec::new();
     for (surface, nodes) in solution.elements.surface_nodes.iter().enumerate() {
         let material = &solution.scene.materials[solution.scene.surface_materials[surface] as usize];
         for &node in nodes.iter().filter(|&&node| node != u32::MAX && material.exitance == Rgb::ZERO) {
             let area = f64::from(solution.elements.nodes[node as usize].area);
-            sides.push((area, solution.exitant.radiosity[node as usize]));
+            sides.push((area, quantity[node as usize]));
         }
     }
     sides
@@ -140,7 +141,8 @@ fn compare_with_finest(points: &mut [Point]) {
     }
 }
 
-fn distance(ours: &[(f64, Rgb)], right: &[(f64, Rgb)]) -> f64 {
+/// Σ area |a − b| / Σ area b.
+pub(crate) fn distance(ours: &[(f64, Rgb)], right: &[(f64, Rgb)]) -> f64 {
     let (mut error, mut total) = (0.0, 0.0);
     for ((area, a), (_, b)) in ours.iter().zip(right) {
         error += area * f64::from((*a - *b).abs().element_sum());

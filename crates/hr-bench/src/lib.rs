@@ -9,13 +9,16 @@
 //! | `curve` | the diffuse solver's error over its time, against reference irradiances and its own finest solution |
 //! | `growth` | time and memory of generated scenes over their size |
 //! | `threads` | what more threads bring, and that they change nothing |
+//! | `transport` | gathering against shooting |
 //! | `form-factors` | form factors against closed forms and brute force |
+//! | `bounds` | how tight the oracle's bounds are |
 //! | `visibility` | rays per second, and links that need none |
 //! | `paper` | what the paper's tables and figures compare |
 //! | `view` | time of frames along a walk |
 
 pub mod accuracy;
 pub mod args;
+pub mod bounds;
 pub mod compare;
 pub mod curve;
 pub mod error;
@@ -29,6 +32,7 @@ pub mod paper;
 pub mod plot;
 pub mod run;
 pub mod threads;
+pub mod transport;
 pub mod views;
 pub mod visibility;
 

@@ -3,7 +3,10 @@
 use crate::args::{AccuracyArgs, Cli, Command, CompareArgs, ReferenceArgs, ThreadsArgs, VisibilityArgs};
 use crate::compare::{compare, luminance};
 use crate::views::{Making, listed, path_traced};
-use crate::{BenchError, accuracy, curve, float_image, form_factors, frames, growth, paper, threads, visibility};
+use crate::{
+    BenchError, accuracy, bounds, curve, float_image, form_factors, frames, growth, paper, threads, transport,
+    visibility,
+};
 use hr_scene::{Camera, ImageKind, Scene, ToneMap, builtin};
 use hr_view::path_tracer::{self, PathTracer};
 use std::io::Write;
@@ -26,7 +29,9 @@ pub fn run(cli: &Cli, out: Out<'_>) -> Result<(), BenchError> {
         Command::Curve(args) => curve::report(args, out),
         Command::Growth(args) => growth::report(args, out),
         Command::Threads(args) => measure_threads(args, out),
+        Command::Transport(args) => transport::report(args, out),
         Command::FormFactors(args) => form_factors::report(args.samples, out),
+        Command::Bounds(args) => bounds::report(args, out),
         Command::Visibility(args) => measure_visibility(args, out),
         Command::Paper(args) => paper::report(args, out),
         Command::View(args) => frames::report(args, out),

@@ -4,6 +4,8 @@ use crate::gather;
 use crate::hierarchy::{Element, Elements};
 use crate::hooks::LightField;
 use crate::links::Link;
+use crate::shooting;
+use crate::solver::{Settings, Transport};
 use crate::threads::prelude::*;
 use crate::{Facing, Rgb};
 use std::time::{Duration, Instant};
@@ -45,25 +47,39 @@ const PARTS: u64 = 4;
 pub(crate) struct Account {
     budget: Budget,
     begin: Instant,
+    transport: Transport,
     /// Bytes of the extension and of weights, per link, when light last was transported.
     extension: f64,
 }
 
 impl Account {
-    pub(crate) fn new(budget: Budget, begin: Instant) -> Self {
-        Self { budget, begin, extension: 0.0 }
+    pub(crate) fn new(settings: Settings, begin: Instant) -> Self {
+        Self { budget: settings.budget, begin, transport: settings.transport, extension: 0.0 }
+    }
+
+    /// Bytes that so many nodes and links take in the solver, without what the extension keeps elsewhere.
+    fn bytes<L: LightField>(&self, nodes: u64, links: u64) -> u64 {
+        // Radiosity, range, irradiance and its last value, directional; facing; whose light it is, gain, peak, brightest.
+        let exitant = 6 * size_of::<Rgb>() + size_of::<Facing>() + 4 * size_of::<u32>();
+        let node =
+            size_of::<Element>() + exitant + gather::NODE_BYTES + size_of::<L::Incident>() + size_of::<L::Exitant>();
+        let link = size_of::<Link>() + gather::LINK_BYTES;
+        let [more, also] = match self.transport {
+            Transport::Gather => [0; 2],
+            Transport::Shoot => [shooting::NODE_BYTES, shooting::LINK_BYTES],
+        };
+        nodes * (node + more) as u64 + links * (link + also) as u64
     }
 
     /// Whether a solution of so many nodes and links is more than there is memory for.
     pub(crate) fn is_full<L: LightField>(&self, nodes: u64, links: u64) -> bool {
-        let bytes = || nodes * node_bytes::<L>() + links * LINK_BYTES + (links as f64 * self.extension) as u64;
+        let bytes = || self.bytes::<L>(nodes, links) + (links as f64 * self.extension) as u64;
         self.budget.memory.is_some_and(|memory| bytes() > memory)
     }
 
     /// Bytes that are left for weights, which need not be kept.
     pub(crate) fn room<L: LightField>(&self, nodes: u64, links: u64) -> u64 {
-        let taken = nodes * node_bytes::<L>() + links * LINK_BYTES;
-        self.budget.memory.map_or(u64::MAX, |memory| memory.saturating_sub(taken))
+        self.budget.memory.map_or(u64::MAX, |memory| memory.saturating_sub(self.bytes::<L>(nodes, links)))
     }
 
     /// Whether it is too late to refine.
@@ -90,18 +106,8 @@ impl Account {
         let sent = reflected.par_iter().map(|light| field.exitant_bytes(light) as u64);
         let extension = weights + received.sum::<u64>() + sent.sum::<u64>();
         self.extension = extension as f64 / links.max(1) as f64;
-        incident.len() as u64 * node_bytes::<L>() + links * LINK_BYTES + extension
+        self.bytes::<L>(incident.len() as u64, links) + extension
     }
-}
-
-/// Bytes of a link and of what arrives through it.
-const LINK_BYTES: u64 = (size_of::<Link>() + gather::LINK_BYTES) as u64;
-
-/// Bytes that a node takes in the solver, without what the extension keeps elsewhere.
-fn node_bytes<L: LightField>() -> u64 {
-    // Radiosity, range, irradiance and its last value, directional; facing; whose light it is, gain, peak, brightest.
-    let exitant = 6 * size_of::<Rgb>() + size_of::<Facing>() + 4 * size_of::<u32>();
-    (size_of::<Element>() + exitant + gather::NODE_BYTES + size_of::<L::Incident>() + size_of::<L::Exitant>()) as u64
 }
 
 /// What there will be when a wave of refinement is done: nodes, and links with the pairs that may become some.

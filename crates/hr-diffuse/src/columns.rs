@@ -17,8 +17,8 @@ pub(crate) const FREELY: f32 = 1.4;
 /// With this, light dies out in any scene.
 pub(crate) const STRICTLY: f32 = 0.9;
 
-/// By node: the factor, at most 1, for the directional light of all its links.
-pub(crate) fn gains<L: LightField>(light: Light<'_, L>, links: &Links, most: f32) -> Vec<f32> {
+/// By node: the factor, at most 1, for the directional light of all its links, which was made of this irradiance of leaves.
+pub(crate) fn gains<L: LightField>(light: Light<'_, L>, links: &Links, most: f32, irradiance: &[Rgb]) -> Vec<f32> {
     let nodes = &light.elements.nodes;
     let mut carried = vec![0.0_f32; nodes.len()];
     let powers = links.all().par_iter().with_min_len(256).map(|link| {
@@ -39,7 +39,7 @@ pub(crate) fn gains<L: LightField>(light: Light<'_, L>, links: &Links, most: f32
     let mut power = vec![0.0_f32; nodes.len()];
     for (node, element) in nodes.iter().enumerate().rev() {
         if element.active && element.is_patch() && element.child_count == 0 {
-            let glossy = light.exitant.irradiance[node] * (Rgb::ONE - element.reflectance);
+            let glossy = irradiance[node] * (Rgb::ONE - element.reflectance);
             power[node] = most * glossy.element_sum() * element.area;
         }
         if node > 0 {

@@ -6,6 +6,7 @@ use crate::hooks::{LightField, NodeId, Transfer};
 use crate::leaf_rows::balance;
 use crate::links::{Link, Links};
 use crate::push::{self, Push, Spread, visible};
+use crate::shooting::Shot;
 use crate::threads::{self, prelude::*};
 use crate::transport::Light;
 use std::ops::ControlFlow;
@@ -117,11 +118,13 @@ impl Gather {
         self.push.weight_bytes()
     }
 
-    /// Evaluates all links, and lets the extension receive what they carry.
+    /// Evaluates all links, of those that `shot` says only for what has not been shot yet, and lets the extension receive what
+    /// they carry.
     pub(crate) fn gather<L: LightField>(
         &mut self,
         light: Light<'_, L>,
         links: &Links,
+        shot: Option<&Shot>,
         incident: &mut [L::Incident],
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
@@ -134,24 +137,30 @@ impl Gather {
                 return ControlFlow::Break(());
             }
             let evaluated = irradiances.par_iter_mut().zip(links).zip(spreads).with_min_len(256);
-            evaluated.for_each(|((irradiance, link), spread)| *irradiance = carried(light, link, *spread));
+            evaluated.for_each(|((irradiance, link), spread)| *irradiance = carried(light, link, *spread, shot));
         }
         self.even = sums(light.elements, links, &self.groups, &self.push.spreads, &arriving);
         self.arriving = arriving;
-        if light.element(0).active {
-            self.receive(light, links, incident, watch)?;
-        }
-        ControlFlow::Continue(())
+        self.receive(light, links, &self.arriving, incident, watch)
     }
 
-    /// Hands what each link carries to the extension, on active receivers.
-    fn receive<L: LightField>(
+    /// What each link carried last.
+    pub(crate) fn arriving(&self) -> &[Rgb] {
+        &self.arriving
+    }
+
+    /// Hands what each link carries to the extension, on active receivers, in place of what they had received.
+    pub(crate) fn receive<L: LightField>(
         &self,
         light: Light<'_, L>,
         links: &Links,
+        arriving: &[Rgb],
         incident: &mut [L::Incident],
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
+        if !light.element(0).active {
+            return ControlFlow::Continue(());
+        }
         let chunk = BETWEEN_WATCHES / 16 * threads::current_num_threads();
         for (i, incident) in incident.chunks_mut(chunk).enumerate() {
             if watch().is_break() {
@@ -165,7 +174,8 @@ impl Gather {
                 }
                 light.field.clear(incident);
                 for at in links.range(node) {
-                    let (sender, irradiance) = (links.all()[at].sender, self.arriving[at]);
+                    // Where light is shot, rounding may leave less than nothing.
+                    let (sender, irradiance) = (links.all()[at].sender, arriving[at].max(Rgb::ZERO));
                     if irradiance.max_element() > 0.0 {
                         let direction = light.direction_to(element.center, sender);
                         let oriented = element.is_flat();
@@ -189,14 +199,15 @@ impl Gather {
     }
 }
 
-/// Irradiance that a link carries.
-fn carried<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> Rgb {
+/// Irradiance that a link carries, or what it carries of light that has not been shot yet.
+fn carried<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread, shot: Option<&Shot>) -> Rgb {
     let visible = link.factor * visible(link, spread);
-    if visible <= 0.0 {
+    if visible <= 0.0 || shot.is_some_and(|shot| !shot.shoots[link.sender as usize]) {
         return Rgb::ZERO;
     }
     let direction = light.direction_to(light.element(link.receiver).center, link.sender);
-    light.emitted(link.sender, -direction) * visible
+    let before = shot.map_or(Rgb::ZERO, |shot| shot.emitted(light, link.sender, -direction));
+    (light.emitted(link.sender, -direction) - before) * visible
 }
 
 /// What a link carries of unit radiosity, from senders that have any.

@@ -20,8 +20,11 @@
 //! - *Pull* needs none, either: inner nodes shine with the light of leaves below them, which the host adds up in the
 //!   direction that it asks for.
 //! - Leaves whose light nobody asks for need not be reflected; materials that are not active need no state.
-//! - A host that gathers calls `clear` in every iteration. One that shoots, where every call of `receive` brings light that
-//!   has not been reflected yet, calls it when it has reflected that light.
+//! - A host that gathers calls `clear` in every iteration: `receive` brings all the light there is.
+//! - In a host that shoots, `receive` brings light that has not been reflected yet. It calls `clear` when it has reflected that
+//!   light, and `reflect` makes what is to be shot next, in the place of what has been shot; `arrived` is what arrived since
+//!   the last `clear`. So incident light is the paper's set `new`. For its set `accum` the host adds up what each link carried;
+//!   when light has settled it calls `clear`, `receive` once per link with the sum, and `reflect`, as if it had gathered.
 //!
 //! # From which thread
 //!
@@ -125,7 +128,7 @@ impl Transfer {
     }
 }
 
-/// What a leaf received in all.
+/// What a leaf received, of all the light that its path holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrived {
     /// Mean irradiance, W/m².
@@ -167,7 +170,7 @@ pub trait LightField: Sync {
     /// where they do not take part. Nodes without any active surface below them are never visited. An engine may
     /// carry the light of materials that reflect next to nothing this way as diffuse light until it is shown.
     fn active(&self, material: u32) -> Option<Rgb>;
-    /// Forgets a node's incident light, before links are gathered anew.
+    /// Forgets a node's incident light, before links carry light anew.
     fn clear(&self, incident: &mut Self::Incident);
     /// Takes one link's light at its receiver, which may be a leaf, an inner element or a cluster.
     fn receive(&self, incident: &mut Self::Incident, transfer: &Transfer);

@@ -312,6 +312,7 @@ impl Stats {
             vertex_rays,
             pairs,
             iterations,
+            links_evaluated,
             ref residuals,
             error,
             bias,
@@ -330,13 +331,25 @@ impl Stats {
             sealed_sides,
             converged_leaves,
             faint_links,
+            shot_links,
         } = skipped;
         let spent = match spent {
             None => 0_u64,
             Some(Spent::Time) => 1,
             Some(Spent::Memory) => 2,
         };
-        out.put(&[polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations.into(), bytes])?;
+        out.put(&[
+            polygons,
+            nodes,
+            leaves,
+            links,
+            rays,
+            vertex_rays,
+            pairs,
+            iterations.into(),
+            links_evaluated,
+            bytes,
+        ])?;
         out.put(&[stopped.into(), spent])?;
         out.put(&[
             black_receivers,
@@ -347,6 +360,7 @@ impl Stats {
             sealed_sides,
             converged_leaves,
             faint_links,
+            shot_links,
         ])?;
         out.put(residuals)?;
         out.put(error.as_slice())?;
@@ -355,7 +369,8 @@ impl Stats {
 
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
-        let [polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations, bytes] = from.take_exactly(WHAT)?;
+        let [polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations, links_evaluated, bytes] =
+            from.take_exactly(WHAT)?;
         let [stopped, spent] = from.take_exactly::<u64, 2>(WHAT)?;
         let [
             black_receivers,
@@ -366,6 +381,7 @@ impl Stats {
             sealed_sides,
             converged_leaves,
             faint_links,
+            shot_links,
         ] = from.take_exactly(WHAT)?;
         Ok(Self {
             polygons,
@@ -375,6 +391,7 @@ impl Stats {
             rays,
             vertex_rays,
             pairs,
+            links_evaluated,
             iterations: u64::try_into(iterations).map_err(|_| FlatError::Misfit(WHAT))?,
             residuals: from.take(WHAT)?,
             error: from.take_finite(WHAT)?.first().copied(),
@@ -396,6 +413,7 @@ impl Stats {
                 sealed_sides,
                 converged_leaves,
                 faint_links,
+                shot_links,
             },
             seconds: Seconds::default(),
         })

@@ -40,6 +40,7 @@ pub mod sampling;
 pub mod scene;
 mod sealed;
 mod segments;
+mod shooting;
 mod skips;
 pub mod solution;
 pub mod solver;
@@ -59,7 +60,7 @@ pub use hooks::{Arrived, Hierarchy, LightField, NodeId, Transfer};
 pub use relight::{Lamp, Variants};
 pub use scene::{DiffuseMaterial, Light, LightKind, SceneInput, Shape, Surface, SurfaceReflectance};
 pub use solution::Solution;
-pub use solver::{Phase, Progress, Settings, Solver};
+pub use solver::{Phase, Progress, Settings, Solver, Transport};
 pub use stats::Stats;
 pub use visibility::{Hit, Visibility};
 

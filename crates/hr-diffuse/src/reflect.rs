@@ -3,10 +3,12 @@
 //! a distant cluster a few stand for all, and their light is added up in the direction asked for, which costs less than
 //! averages over all directions.
 
+use crate::columns::gains;
 use crate::hierarchy::Elements;
 use crate::hooks::{Arrived, LightField, NodeId};
 use crate::links::Links;
 use crate::sampling::{hash, unit};
+use crate::shooting::NEW_SHARE;
 use crate::solver::{Phase, Progress, Solver};
 use crate::threads::{self, prelude::*};
 use crate::{Cone, Rgb};
@@ -133,20 +135,39 @@ fn thinned(all: Vec<(u32, f32)>, seed: u32) -> Representatives {
 }
 
 impl<L: LightField> Solver<L> {
-    /// Reflects the light of the leaves that stand for what the links ask for, where it has changed, until `watch` breaks.
-    /// Tells whether any has.
-    pub(crate) fn reflect_senders(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
-        let count = self.elements.nodes.len();
+    /// Reflects light that arrived at senders, until `watch` breaks: all of it where it has changed, or what is new.
+    pub(crate) fn reflect_senders(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         if !self.elements.nodes[0].active {
-            return false;
+            return;
         }
+        let shot = self.shot.take();
+        let new = shot.as_ref().map(|shot| shot.new.as_slice());
+        if self.reflect_standing(new, watch) {
+            let irradiance = new.unwrap_or(&self.exitant.irradiance);
+            self.exitant.gain = gains(self.light(), &self.links, self.most_reflected, irradiance);
+        }
+        self.shot = shot;
+    }
+
+    /// Reflects the light of the leaves that stand for what the links ask for, where it has changed, or `new` light (by
+    /// leaf) in the place of what they reflected before; until `watch` breaks. Tells whether any has.
+    fn reflect_standing(&mut self, new: Option<&[Rgb]>, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
+        let count = self.elements.nodes.len();
         self.last_reflected.resize(count, Rgb::splat(f32::NEG_INFINITY));
+        self.brightest.resize(count, 0.0);
         let (elements, faint) = (&self.elements, &self.faint);
         let senders = Senders::new(elements, &self.links, |leaf| {
             faint[elements.nodes[leaf as usize].material as usize] == Rgb::ZERO
         });
         let leaves = senders.leaves(elements);
-        let changed = self.reflect(&leaves, watch);
+        if new.is_some() {
+            // What they reflected has been shot.
+            for &Standing { leaf, .. } in &leaves {
+                self.reflected[leaf as usize] = L::Exitant::default();
+                self.brightest[leaf as usize] = 0.0;
+            }
+        }
+        let changed = self.reflect(&leaves, new, watch);
         let mut stands = vec![false; count];
         for standing in leaves {
             stands[standing.leaf as usize] = true;
@@ -172,7 +193,6 @@ impl<L: LightField> Solver<L> {
                 high.max(-low).max_element().max(0.0)
             })
             .collect();
-        self.brightest.resize(self.elements.nodes.len(), 0.0);
         for (&leaf, brightest) in changed.iter().zip(brightest) {
             self.brightest[leaf as usize] = brightest;
         }
@@ -185,17 +205,23 @@ impl<L: LightField> Solver<L> {
         }
     }
 
-    /// The extension turns the incident light of leaves into exitant light where it has changed, until `watch` breaks.
-    /// Tells where.
-    fn reflect(&mut self, leaves: &[Standing], watch: &mut dyn FnMut() -> ControlFlow<()>) -> Vec<u32> {
+    /// The extension turns the incident light of leaves into exitant light where it has changed, or where there is enough
+    /// `new` light, which is what the incident light is then; until `watch` breaks. Tells where.
+    fn reflect(
+        &mut self,
+        leaves: &[Standing],
+        new: Option<&[Rgb]>,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Vec<u32> {
         let elements = &self.elements;
-        let tolerance = REFLECT_SHARE * self.settings.error;
+        let tolerance = self.settings.error * if new.is_some() { NEW_SHARE } else { REFLECT_SHARE };
         let mut changed: Vec<Standing> = leaves
             .iter()
             .copied()
             .filter(|&Standing { leaf, .. }| {
                 let now = self.exitant.irradiance[leaf as usize];
-                let change = (now - self.last_reflected[leaf as usize]).abs().max_element();
+                let change = new.map_or_else(|| now - self.last_reflected[leaf as usize], |new| new[leaf as usize]);
+                let change = change.abs().max_element();
                 !self.skips.converged_leaves || change > tolerance * now.max_element()
             })
             .collect();
@@ -209,7 +235,7 @@ impl<L: LightField> Solver<L> {
             }
             path.reverse();
             let element = &elements.nodes[leaf as usize];
-            let irradiance = self.exitant.irradiance[leaf as usize];
+            let irradiance = new.unwrap_or(&self.exitant.irradiance)[leaf as usize];
             let diffuse = irradiance * element.reflectance * FRAC_1_PI;
             self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse, spread })
         };
@@ -248,7 +274,7 @@ impl<L: LightField> Solver<L> {
         let progress = self.progress(Phase::Transport, 0.9);
         let (mut done, mut stopped) = (0, false);
         let chunk = BETWEEN_WATCHES * threads::current_num_threads();
-        self.reflect(&leaves, &mut || {
+        self.reflect(&leaves, None, &mut || {
             let share = (done as f32 / leaves.len() as f32).min(1.0);
             done += chunk;
             let answer = watch(&Progress { fraction: progress.fraction + 0.04 * share, ..progress });

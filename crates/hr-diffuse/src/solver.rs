@@ -1,7 +1,7 @@
 //! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
 
 use crate::budget::{Account, Budget};
-use crate::columns::{FREELY, STRICTLY, gains};
+use crate::columns::{FREELY, STRICTLY};
 use crate::convergence::Convergence;
 use crate::error::SolveError;
 use crate::exposed::expose;
@@ -15,6 +15,7 @@ use crate::reflect::Senders;
 use crate::relight::Linked;
 use crate::residual::{RAYS_PER_LEAF, residual};
 use crate::resume::{Unfinished, is_close};
+use crate::shooting::Shot;
 use crate::skips::Skips;
 use crate::stats::Stats;
 use crate::steady;
@@ -51,6 +52,17 @@ const MOST_LIGHT: f32 = 1e30;
 /// Channels with less than this share of the strongest one's light need not converge by themselves.
 const FAINT_CHANNEL: f64 = 1e-3;
 
+/// How light travels over links from one iteration to the next. Both ways lead to the same answer, within the error asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Transport {
+    /// Gathering: every receiver adds up what its links carry of all the light there is.
+    #[default]
+    Gather,
+    /// Shooting: links carry the light that has not been shot yet, and what arrives is added to what there is. Light that
+    /// an extension makes is reflected once for each reflection that it has behind it, and once more as a whole at the end.
+    Shoot,
+}
+
 /// What is asked of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -58,13 +70,15 @@ pub struct Settings {
     pub error: f32,
     /// What it may cost.
     pub budget: Budget,
+    /// How light travels.
+    pub transport: Transport,
 }
 
 impl Settings {
     /// An error asked for, whatever it costs.
     #[must_use]
     pub fn with_error(error: f32) -> Self {
-        Self { error, budget: Budget::default() }
+        Self { error, budget: Budget::default(), transport: Transport::default() }
     }
 
     /// Whether they can be met.
@@ -125,7 +139,7 @@ pub struct Solver<L: LightField = ()> {
     /// What is left to be done.
     pub(crate) unfinished: Unfinished,
     /// What arrives through the links there are.
-    gather: Gather,
+    pub(crate) gather: Gather,
     /// Whether it is known for these links as well as it can be.
     prepared: bool,
     /// What has links.
@@ -137,8 +151,10 @@ pub struct Solver<L: LightField = ()> {
     strong: Vec<Rgb>,
     /// Irradiance of each leaf when its light was last reflected by the extension.
     pub(crate) last_reflected: Vec<Rgb>,
+    /// What has been shot, while light is.
+    pub(crate) shot: Option<Shot>,
     /// What links may carry of directional light: see [`columns`](crate::columns).
-    most_reflected: f32,
+    pub(crate) most_reflected: f32,
     /// Largest radiance of each leaf's directional light (max channel).
     pub(crate) brightest: Vec<f32>,
     /// Area whose light counts.
@@ -178,7 +194,7 @@ impl<L: LightField> Solver<L> {
         let incident = std::iter::repeat_with(L::Incident::default).take(count).collect();
         let reflected = std::iter::repeat_with(L::Exitant::default).take(count).collect();
         let solver = Self::with_light(scene, elements, exitant, (field, incident, reflected), settings);
-        let mut solver = Self { skips, account: Account::new(settings.budget, start), ..solver };
+        let mut solver = Self { skips, account: Account::new(settings, start), ..solver };
         solver.unfinished = Unfinished::new(vec![Pair { receiver: 0, sender: 0 }]);
         solver.stats.polygons = input.surfaces.len() as u64;
         solver.pull();
@@ -207,7 +223,7 @@ impl<L: LightField> Solver<L> {
             reflected,
             settings,
             stats: Stats::default(),
-            account: Account::new(settings.budget, Instant::now()),
+            account: Account::new(settings, Instant::now()),
             skips: Skips::ALL,
             unfinished: Unfinished::new(Vec::new()),
             gather: Gather::default(),
@@ -216,6 +232,7 @@ impl<L: LightField> Solver<L> {
             faint,
             strong,
             last_reflected: Vec::new(),
+            shot: None,
             most_reflected: FREELY,
             brightest: Vec::new(),
             area,
@@ -257,8 +274,11 @@ impl<L: LightField> Solver<L> {
         }
         if self.stats.iterations == 0 {
             // Whenever it was stopped, there is some light.
-            self.prepare(None, &mut || ControlFlow::Continue(()));
-            self.iterate(false, &mut || ControlFlow::Continue(()));
+            let whole = &mut || ControlFlow::Continue(());
+            self.prepare(None, whole);
+            self.begin_shooting(false);
+            self.iterate(false, whole);
+            self.finish_shooting(false, false, None, whole);
         }
         self.measure();
         self.stats.stopped = stopped;
@@ -289,8 +309,9 @@ impl<L: LightField> Solver<L> {
 
     /// Iterates until light has settled, as far as a pass needs it.
     fn settle(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
-        // The extension's light is reflected when most of it is there: that is what takes time.
-        if !pass.closely || self.elements.nodes[0].active {
+        // The extension's light is reflected when most of it is there: that is what takes time. Shooting starts from the dark anyhow.
+        let warms = self.settings.transport == Transport::Gather && self.elements.nodes[0].active;
+        if !pass.closely || warms {
             self.iterate_until(pass, (FEW_ITERATIONS, 1.0, false), stopped, watch);
         }
         if pass.closely && !*stopped {
@@ -306,8 +327,13 @@ impl<L: LightField> Solver<L> {
         stopped: &mut bool,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) {
+        if *stopped {
+            return;
+        }
         let account = self.account;
-        for iteration in 0..most {
+        let mut before = self.begin_shooting(reflects);
+        let mut settled = false;
+        for iteration in 0..if before.is_some() { MOST_ITERATIONS } else { most } {
             let fraction = pass.fraction(0.6 + 0.3 * (iteration as f32 / (iteration as f32 + 4.0)));
             let progress = self.progress(Phase::Transport, fraction);
             let ask = &mut || {
@@ -315,14 +341,20 @@ impl<L: LightField> Solver<L> {
                 if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
             let Some(residual) = self.iterate(reflects, ask) else { break };
+            before = None;
             if self.grows() {
                 self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
             }
-            let settled = self.remaining(residual) < share * self.settings.error && iteration > 0;
+            settled = self.remaining(residual) < share * self.settings.error && iteration > 0;
             if *stopped || settled || account.is_over() {
                 break;
             }
         }
+        let progress = self.progress(Phase::Transport, pass.fraction(0.9));
+        self.finish_shooting(reflects, settled, before, &mut || {
+            *stopped = *stopped || watch(&progress).is_break();
+            if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
     }
 
     /// Finds what the solution is off by.
@@ -346,7 +378,7 @@ impl<L: LightField> Solver<L> {
     /// Begins a new series of iterations: the light is another one.
     pub(crate) fn restart(&mut self) {
         self.convergence.restart();
-        self.account = Account::new(self.settings.budget, Instant::now());
+        self.account = Account::new(self.settings, Instant::now());
     }
 
     /// Tells materials whose extension's light travels as diffuse light from the others.
@@ -417,8 +449,8 @@ impl<L: LightField> Solver<L> {
         self.push();
         let residual = self.extrapolate(&before);
         let middle = Instant::now();
-        if reflects && self.reflect_senders(watch) {
-            self.exitant.gain = gains(self.light(), &self.links, self.most_reflected);
+        if reflects {
+            self.reflect_senders(watch);
         }
         let end = Instant::now();
         self.pull();
@@ -483,15 +515,25 @@ impl<L: LightField> Solver<L> {
     /// Every receiver adds up what its links carry.
     fn gather(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> ControlFlow<()> {
         let (mut gather, mut incident) = (std::mem::take(&mut self.gather), std::mem::take(&mut self.incident));
-        let answer = gather.gather(self.light(), &self.links, &mut incident, watch);
-        (self.gather, self.incident) = (gather, incident);
+        let mut shot = self.shot.take();
+        if let Some(shot) = &mut shot {
+            shot.choose(self.light(), self.negligibly_unshot());
+        }
+        let answer = gather.gather(self.light(), &self.links, shot.as_ref(), &mut incident, watch);
+        if answer.is_continue() {
+            let waiting = shot.as_mut().map_or(0, |shot| shot.note(self.light(), &self.links, gather.arriving()));
+            self.stats.links_evaluated += self.links.all().len() as u64 - waiting;
+            self.stats.skipped.shot_links += waiting;
+        }
+        (self.gather, self.incident, self.shot) = (gather, incident, shot);
         answer
     }
 
     /// Hands light down to the leaves.
     fn push(&mut self) {
         for (leaf, irradiance) in self.gather.push(self.light(), &self.links) {
-            self.exitant.irradiance[leaf as usize] = irradiance;
+            let all = self.shot.as_mut().map_or(irradiance, |shot| shot.receive(leaf, irradiance));
+            self.exitant.irradiance[leaf as usize] = all;
         }
     }
 

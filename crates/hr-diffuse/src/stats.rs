@@ -22,6 +22,8 @@ pub struct Stats {
     pub pairs: u64,
     /// Iterations (gather, push, reflect, pull).
     pub iterations: u32,
+    /// Links that light was sent over, each counted in every iteration that did so.
+    pub links_evaluated: u64,
     /// Change of the mean radiosity by each iteration, relative to its value.
     pub residuals: Vec<f32>,
     /// Relative L1 error of the leaves' irradiance, weighted by what they reflect, that rays have found; `None` where they did not
@@ -61,6 +63,8 @@ pub struct Skipped {
     pub converged_leaves: u64,
     /// Links that bring so little that leaves do not look for themselves what they bring there.
     pub faint_links: u64,
+    /// Links over which nothing was shot in an iteration, as their senders had next to no unshot light.
+    pub shot_links: u64,
 }
 
 impl std::ops::AddAssign for Skipped {
@@ -73,6 +77,7 @@ impl std::ops::AddAssign for Skipped {
         self.sealed_sides += other.sealed_sides;
         self.converged_leaves += other.converged_leaves;
         self.faint_links += other.faint_links;
+        self.shot_links += other.shot_links;
     }
 }
 

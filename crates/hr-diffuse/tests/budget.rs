@@ -30,7 +30,8 @@ fn room() -> SceneInput {
 }
 
 fn solve(error: f32, budget: Budget) -> Solution {
-    let mut solver = Solver::new(&room(), Settings { error, budget }, ()).expect("the room is sound");
+    let mut solver =
+        Solver::new(&room(), Settings { budget, ..Settings::with_error(error) }, ()).expect("the room is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
     solver.finish(&mut |_| ControlFlow::Continue(()))
 }

@@ -167,7 +167,8 @@ fn solve(
         if stopped { Wanted::Now } else { Wanted::Whole }
     };
     let time = args.time_budget.map(|budget| Duration::from_secs_f64(budget).saturating_sub(progress.elapsed()));
-    let settings = Settings { error: args.error, budget: Budget { time, ..Budget::default() } };
+    let budget = Budget { time, ..Budget::default() };
+    let settings = Settings { error: args.error, budget, transport: args.transport };
     Ok(match begun {
         Some((solved, accuracy)) => solved.resumed(settings, distributions, accuracy, ask)?,
         None => Solved::awaited(scene, settings, distributions, ask)?,

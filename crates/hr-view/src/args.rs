@@ -4,6 +4,7 @@ use crate::ViewError;
 use crate::glossy::Mode;
 use clap::Parser;
 use clap::error::ErrorKind;
+use hr_diffuse::Transport;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -45,6 +46,10 @@ pub struct Args {
     #[arg(long, value_name = "E", value_parser = error, default_value_t = 0.15, allow_negative_numbers = true)]
     pub error: f32,
 
+    /// How light travels between surfaces: gather, where all of it does in each iteration, or shoot, where only what is new does
+    #[arg(long, value_name = "T", value_parser = transport, default_value = "gather")]
+    pub transport: Transport,
+
     /// Stop refining after so many seconds and show what there is
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub time_budget: Option<f64>,
@@ -62,7 +67,7 @@ pub struct Args {
     pub save: Option<PathBuf>,
 
     /// Look at a solution of this SCENE that --save kept, without solving
-    #[arg(long, value_name = "IN", conflicts_with_all = ["save", "error", "time_budget"])]
+    #[arg(long, value_name = "IN", conflicts_with_all = ["save", "error", "transport", "time_budget"])]
     pub load: Option<PathBuf>,
 
     /// Go on with a solution of this SCENE that --save kept, stopped ones too, to the accuracy asked for
@@ -126,6 +131,14 @@ fn error(text: &str) -> Result<f32, String> {
     if (0.001..=1.0).contains(&value) { Ok(value) } else { Err("must be from 0.001 to 1, such as 0.02".into()) }
 }
 
+fn transport(text: &str) -> Result<Transport, String> {
+    match text {
+        "gather" => Ok(Transport::Gather),
+        "shoot" => Ok(Transport::Shoot),
+        _ => Err("must be gather or shoot".into()),
+    }
+}
+
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         // A duration of more seconds than this would not fit one.
@@ -167,13 +180,16 @@ mod tests {
         let nothing = run("");
         assert_eq!(nothing.scene, hr_scene::builtin::DEFAULT, "no scene is the default scene");
         assert_eq!(nothing.mode, Mode::Distributions, "the paper's mode is the default");
-        let all = run("a.mgf --camera c.json --image o.exr --mode samples --error 0.02 --time-budget 10 --threads 3 \
-             --stats s.json");
+        let all = run(
+            "a.mgf --camera c.json --image o.exr --mode samples --error 0.02 --transport shoot --time-budget 10 --threads 3 \
+             --stats s.json",
+        );
         assert_eq!(all.scene, "a.mgf", "scene");
         assert_eq!(all.camera, Some("c.json".into()), "camera");
         assert_eq!(all.image, Some("o.exr".into()), "image");
         assert_eq!(all.mode, Mode::Samples, "mode");
         assert_eq!((all.error, all.time_budget, all.threads), (0.02, Some(10.0), Some(3)), "numbers");
+        assert_eq!((all.transport, nothing.transport), (Transport::Shoot, Transport::default()), "transport");
         assert_eq!(all.stats, Some("s.json".into()), "stats");
         assert_eq!(run("--mode gather --image o.exr").mode, Mode::Gather, "stills by a final gather");
         assert_eq!(run("--save s.hrs").save, Some("s.hrs".into()), "save");
@@ -192,6 +208,8 @@ mod tests {
             ("--error nan", "0.001"),
             ("--time-budget -1", "seconds"),
             ("--time-budget inf", "seconds"),
+            ("--transport teleport", "gather or shoot"),
+            ("--load x --transport shoot", "--transport"),
             ("--threads 0", "1 to 1024"),
             ("--threads 99999999999999999999", "1 to 1024"),
             ("--mode best", "gather"),

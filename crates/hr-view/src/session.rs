@@ -268,7 +268,8 @@ impl Session {
         let Some(scene) = self.scene.clone() else { return Ok(()) };
         self.begin("building the hierarchy");
         let is_glance = time == Some(Duration::ZERO);
-        let settings = Settings { error, budget: Budget { time, ..Budget::default() } };
+        let budget = Budget { time, ..Budget::default() };
+        let settings = Settings { error, budget, transport: self.args.transport };
         // Mirrors are shown by their distributions in any mode; what is kept is for every mode.
         let mirrors = || scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
         let wants_distributions = self.args.mode == Mode::Distributions || self.args.save.is_some() || mirrors();

@@ -48,6 +48,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "nodes": stats.nodes,
             "leaves": stats.leaves,
             "links": stats.links,
+            "links_evaluated": stats.links_evaluated,
             "rays": stats.rays + stats.vertex_rays,
             "vertex_rays": stats.vertex_rays,
             "pairs": stats.pairs,
@@ -66,6 +67,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "sealed_sides": skipped.sealed_sides,
             "converged_leaves": skipped.converged_leaves,
             "faint_links": skipped.faint_links,
+            "shot_links": skipped.shot_links,
         },
         "stopped": stats.stopped,
         "budget_spent": stats.spent.map(|spent| match spent {

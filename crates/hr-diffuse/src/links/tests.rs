@@ -15,7 +15,7 @@ fn solve(surfaces: Vec<Surface>, error: f32) -> Option<Solver> {
     let input = SceneInput { surfaces, materials: vec![grey, lamp, black], ..SceneInput::default() };
     // Surfaces that run through each other have no end of detail.
     let budget = Budget { memory: Some(1_000_000), ..Budget::default() };
-    let mut solver = Solver::new(&input, Settings { error, budget }, ()).ok()?;
+    let mut solver = Solver::new(&input, Settings { budget, ..Settings::with_error(error) }, ()).ok()?;
     solver.solve(&mut |_| ControlFlow::Continue(()));
     Some(solver)
 }

@@ -53,7 +53,7 @@ fn check_scene(path: &Path) -> Result<bool, String> {
     }
     let budget = Budget { time: Some(Duration::from_millis(50)), memory: Some(1 << 20) };
     let field = GlossyField::new(&scene.reflectors(), Refinement::default());
-    let mut solver = match Solver::new(&scene.input(), Settings { error: 0.5, budget }, field) {
+    let mut solver = match Solver::new(&scene.input(), Settings { budget, ..Settings::with_error(0.5) }, field) {
         Ok(solver) => solver,
         // What loading cannot see, or mend.
         Err(SolveError::NoSteadyState { .. } | SolveError::Light { .. }) => return Ok(true),
