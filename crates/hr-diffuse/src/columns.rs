@@ -11,9 +11,9 @@ use crate::links::Links;
 use crate::threads::prelude::*;
 use crate::transport::Light;
 
-/// Of what a leaf does not reflect diffusely, links may carry so much as directional light at first. What the links of a
-/// sender carry errs either way; to cut it off at what is right on average would lose light.
-pub(crate) const FREELY: f32 = 1.4;
+/// Of what a leaf reflects as directional light, links may carry so much at first. What the links of a sender carry errs
+/// either way; to cut it off at what is right on average would lose light.
+pub(crate) const FREELY: f32 = 1.6;
 /// With this, light dies out in any scene.
 pub(crate) const STRICTLY: f32 = 0.9;
 
@@ -39,7 +39,8 @@ pub(crate) fn gains<L: LightField>(light: Light<'_, L>, links: &Links, most: f32
     let mut power = vec![0.0_f32; nodes.len()];
     for (node, element) in nodes.iter().enumerate().rev() {
         if element.active && element.is_patch() && element.child_count == 0 {
-            let glossy = light.exitant.irradiance[node] * (Rgb::ONE - element.reflectance);
+            let albedo = light.field.active(element.material).unwrap_or(Rgb::ZERO);
+            let glossy = light.exitant.irradiance[node] * albedo;
             power[node] = most * glossy.element_sum() * element.area;
         }
         if node > 0 {

@@ -88,7 +88,7 @@ impl Senders {
             let standing = self.of(node as u32);
             // As if they divided the cone of normals among them.
             let spread = element.normals.angle() / (standing.len() as f32).sqrt();
-            let spread = if element.child_count == 0 || spread.is_nan() { 0.0 } else { spread };
+            let spread = if element.child_count == 0 { 0.0 } else { spread.max(0.0) };
             leaves.extend(standing.iter().map(|&(leaf, _)| Standing { leaf, spread }));
         }
         leaves.sort_unstable_by(|a, b| a.leaf.cmp(&b.leaf).then(a.spread.total_cmp(&b.spread)));
