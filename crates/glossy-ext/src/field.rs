@@ -167,14 +167,13 @@ impl<B: Basis> GlossyField<B> {
         }
         balance(&mut incident, arrived.irradiance);
         let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
-        // A lobe that is not round is narrower one way; a mirror shows everything.
-        if material.mirror.is_none() && material.reflector.grain().is_none() {
-            merge_close(&mut incident, width);
-        }
-        merge_weak(&mut incident);
-        // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
         // Normals that turn by an angle turn what is reflected by twice as much.
         let narrowest = (2.0 * arrived.spread).clamp(NARROWEST, FRAC_PI_2);
+        // A lobe that is not round is narrower one way; a mirror shows everything.
+        let is_wide = material.mirror.is_none() && material.reflector.grain().is_none();
+        merge_close(&mut incident, if is_wide { width.max(narrowest) } else { narrowest });
+        merge_weak(&mut incident);
+        // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
         for sample in &mut incident {
             sample.extent = sample.extent.max(if width < WIDE * narrowest { narrowest } else { 0.0 });
             if sample.extent * WIDE < width {

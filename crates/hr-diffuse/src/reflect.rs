@@ -81,14 +81,13 @@ impl Senders {
     }
 
     /// All leaves that stand for something, in order, each with the angle within which the normals are for which it
-    /// stands: the least where it stands for several nodes.
+    /// stands, its own among them: the least where it stands for several nodes.
     fn leaves(&self, elements: &Elements) -> Vec<Standing> {
         let mut leaves: Vec<Standing> = Vec::with_capacity(self.standing.len());
         for (node, element) in elements.nodes.iter().enumerate() {
             let standing = self.of(node as u32);
-            // As if they divided the cone of normals among them.
-            let spread = element.normals.angle() / (standing.len() as f32).sqrt();
-            let spread = if element.child_count == 0 { 0.0 } else { spread.max(0.0) };
+            // As if they divided the cone of normals among them. A curved leaf has one, too.
+            let spread = (element.normals.angle() / (standing.len() as f32).sqrt()).max(0.0);
             leaves.extend(standing.iter().map(|&(leaf, _)| Standing { leaf, spread }));
         }
         leaves.sort_unstable_by(|a, b| a.leaf.cmp(&b.leaf).then(a.spread.total_cmp(&b.spread)));
