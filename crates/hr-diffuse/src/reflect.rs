@@ -86,8 +86,9 @@ impl Senders {
         let mut leaves: Vec<Standing> = Vec::with_capacity(self.standing.len());
         for (node, element) in elements.nodes.iter().enumerate() {
             let standing = self.of(node as u32);
-            // As if they divided the cone of normals among them. A curved leaf has one, too.
-            let spread = (element.normals.angle() / (standing.len() as f32).sqrt()).max(0.0);
+            // As if they divided the cone of normals among them. Most normals of a single leaf are nearer to its own.
+            let share = if element.child_count == 0 { 0.5 } else { (standing.len() as f32).sqrt().recip() };
+            let spread = (element.normals.angle() * share).max(0.0);
             leaves.extend(standing.iter().map(|&(leaf, _)| Standing { leaf, spread }));
         }
         leaves.sort_unstable_by(|a, b| a.leaf.cmp(&b.leaf).then(a.spread.total_cmp(&b.spread)));
