@@ -342,7 +342,7 @@ impl<L: LightField> Solver<L> {
             };
             let Some(residual) = self.iterate(reflects, ask) else { break };
             before = None;
-            if self.grows() {
+            if self.grows(iteration) {
                 self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
             }
             settled = self.remaining(residual) < share * self.settings.error && iteration > 0;
@@ -617,10 +617,12 @@ impl<L: LightField> Solver<L> {
         if area > 0.0 { (lit / area) as f32 } else { (power / f64::from(self.area)) as f32 }
     }
 
-    /// Whether each of the last iterations changed more than the one before: light that does not die out.
-    fn grows(&self) -> bool {
-        let last = &self.stats.residuals[self.stats.residuals.len().saturating_sub(4)..];
-        last.len() == 4 && last.windows(2).all(|pair| pair[1] > pair[0])
+    /// Whether each of the last iterations after the first ones changed more than the last but one before it: light that does
+    /// not die out. Between two surfaces it goes forth and back, and every other iteration may change less.
+    fn grows(&self, iteration: u32) -> bool {
+        const LAST: usize = 5;
+        let last = &self.stats.residuals[self.stats.residuals.len().saturating_sub(LAST)..];
+        iteration as usize >= LAST && last.windows(3).all(|three| three[2] > three[0])
     }
 
     /// What all iterations to come would change.
