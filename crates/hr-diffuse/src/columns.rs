@@ -80,7 +80,7 @@ mod tests {
         let arrived: f32 =
             grey.map(|leaf| solver.exitant.irradiance[leaf].element_sum() * light.elements.nodes[leaf].area).sum();
         let carried = |most| {
-            let gains = gains(light, &solver.links, most);
+            let gains = gains(light, &solver.links, most, &solver.exitant.irradiance);
             let links = solver.links.all().iter();
             links.map(|link| power(light, link) * gains[link.sender as usize]).sum::<f32>()
         };
