@@ -1,14 +1,16 @@
 //! The open window: events in, frames out.
 
 use super::canvas::{Canvas, Output};
+use super::frame::Frame;
 use super::gauge::Gauge;
 use super::gpu::Gpu;
 use super::hud::{Facts, Hud, Settings};
 use super::input::{Command, command};
+use super::layouts::Layouts;
 use super::looking::Looking;
-use super::pipelines::{Layouts, Pass};
-use super::scene_buffers::Frame;
-use super::screen::{News, Prepared, Status, Wish};
+use super::parts::Parts;
+use super::pipelines::Pass;
+use super::screen::{News, Prepared, Screen, Status, Wish};
 use super::shown::Shown;
 use super::snapshot::Snapshot;
 use super::tone::Tone;
@@ -18,11 +20,12 @@ use super::walker::Walker;
 use super::{Blank, Walked, WindowError, WindowOptions, full, reason, unused};
 use crate::display::Walkable;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 use winit::dpi::{LogicalSize, PhysicalPosition};
 use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
-use winit::event_loop::ActiveEventLoop;
+use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::keyboard::PhysicalKey;
 use winit::window::{CursorGrabMode, Window};
 
@@ -65,6 +68,8 @@ pub(super) struct Live {
     pass: Pass,
     walk: Arc<dyn Walkable>,
     shown: Shown,
+    /// Whether glossy light is wanted the other way round than the solution prefers it, as who prepares solutions knows it.
+    is_turned: Arc<AtomicBool>,
     automatic: Tone,
     gauge: Gauge,
     looking: Looking,
@@ -106,8 +111,8 @@ impl Live {
         // Walking smoothly comes before smooth edges.
         let samples = if gpu.is_slow() { 1 } else { gpu.samples(canvas.format()) };
         let pass = Pass::new(&gpu, &layouts, canvas.format(), samples);
-        let Prepared { lists, tone, .. } = Prepared::new(Arc::clone(&walk))?;
-        let shown = Shown::new(&gpu, &layouts, walk.as_ref(), lists)?;
+        let Prepared { parts, tone, .. } = Prepared::new(Arc::clone(&walk), gpu.capacity(), false)?;
+        let shown = Shown::new(&gpu, &layouts, walk.as_ref(), parts)?;
         gpu.fault()?;
         let info = gpu.adapter.get_info();
         let walker = Walker::new(walk.as_ref());
@@ -133,6 +138,7 @@ impl Live {
             walked: Walked::default(),
             walk,
             shown,
+            is_turned: Arc::default(),
             window,
             gpu,
             canvas,
@@ -142,6 +148,11 @@ impl Live {
         live.window.set_visible(true);
         live.window.request_redraw();
         Ok(live)
+    }
+
+    /// What solutions are shown on.
+    pub(super) fn screen(&self, proxy: EventLoopProxy<News>) -> Screen {
+        Screen::new(proxy, self.gpu.capacity(), Arc::clone(&self.is_turned))
     }
 
     /// What was done so far.
@@ -174,9 +185,9 @@ impl Live {
     }
 
     fn show(&mut self, prepared: Prepared) -> Result<(), WindowError> {
-        let Prepared { walk, lists, tone, tour } = prepared;
+        let Prepared { walk, parts, wants_pixels, tone, tour } = prepared;
         let is_first = self.walk.mesh().positions.is_empty();
-        match Shown::new(&self.gpu, &self.layouts, walk.as_ref(), lists) {
+        match Shown::new(&self.gpu, &self.layouts, walk.as_ref(), parts) {
             Ok(shown) => self.shown = shown,
             // What there is may still be walked through.
             Err(error @ WindowError::TooLarge { .. }) if !is_first => {
@@ -196,8 +207,37 @@ impl Live {
         }
         self.window.set_title(&title(walk.name(), &self.status));
         self.walk = walk;
+        if wants_pixels && is_first {
+            self.tell_of_pixels();
+        }
         self.gauge.high = self.gauge.quantity.high(self.walk.mesh());
         self.looking.update(&self.gpu, self.walk.as_ref())
+    }
+
+    /// Shows glossy light at pixels instead of vertices, or the other way round.
+    fn turn_pixels(&mut self) -> Result<(), WindowError> {
+        let wants_pixels = self.shown.left.is_none();
+        let parts = Parts::new(self.walk.as_ref(), self.gpu.capacity(), wants_pixels);
+        self.is_turned.store(wants_pixels != self.walk.prefers_pixels(), Ordering::Relaxed);
+        self.shown = Shown::new(&self.gpu, &self.layouts, self.walk.as_ref(), parts)?;
+        if wants_pixels {
+            self.tell_of_pixels();
+        } else {
+            self.hud.say("glossy light at vertices".to_owned());
+        }
+        Ok(())
+    }
+
+    /// Says what has become of the wish for glossy light at pixels.
+    fn tell_of_pixels(&mut self) {
+        self.hud.say(match &self.shown.left {
+            None if self.gpu.capacity().storage.is_none() => {
+                "this device cannot compute glossy light at pixels; it stays at vertices".to_owned()
+            }
+            None => "nothing here has glossy light at pixels; it stays at vertices".to_owned(),
+            Some(left) if left.is_empty() => "glossy light at each pixel".to_owned(),
+            Some(left) => format!("glossy light at each pixel, but at vertices on {}", left.join(", ")),
+        });
     }
 
     pub(super) fn window_event(&mut self, event: &WindowEvent) -> Result<Next, WindowError> {
@@ -284,6 +324,7 @@ impl Live {
                 let quantity = self.gauge.quantity.next();
                 self.gauge = Gauge { quantity, high: quantity.high(self.walk.mesh()) };
             }
+            Command::Pixels => self.turn_pixels()?,
             Command::Play => {
                 let said = self.tour.play(Instant::now());
                 self.hud.say(said);
@@ -459,7 +500,8 @@ impl Live {
             camera: self.camera.and_then(|i| self.walk.cameras().get(i)).map(|(name, _)| name.as_str()),
             triangles: mesh.triangle_count(),
             vertices: mesh.positions.len(),
-            glossy: mesh.glossy.len(),
+            glossy: if self.shown.left.is_some() { self.shown.refreshed.visible } else { mesh.glossy.len() },
+            at_pixels: self.shown.left.is_some(),
             evaluated: self.shown.refreshed.evaluated,
             evaluation: self.shown.evaluation,
             frame: self.frame_time,

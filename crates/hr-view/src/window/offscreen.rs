@@ -1,10 +1,11 @@
 //! Frames without a window, one after the other, and what each costs.
 
-use super::chunks::chunked;
+use super::frame::Frame;
 use super::gauge::Gauge;
 use super::gpu::{Gpu, one_line};
-use super::pipelines::{Layouts, Pass};
-use super::scene_buffers::Frame;
+use super::layouts::Layouts;
+use super::parts::Parts;
+use super::pipelines::Pass;
 use super::shown::Shown;
 use super::tone::Tone;
 use super::view::View;
@@ -52,7 +53,7 @@ impl<'a> Offscreen<'a> {
         // As in the window.
         let samples = if gpu.is_slow() { 1 } else { gpu.samples(snapshot::FORMAT) };
         let pass = Pass::new(&gpu, &layouts, snapshot::FORMAT, samples);
-        let shown = Shown::new(&gpu, &layouts, walk, chunked(mesh))?;
+        let shown = Shown::new(&gpu, &layouts, walk, Parts::new(walk, gpu.capacity(), walk.prefers_pixels()))?;
         gpu.fault()?;
         Ok(Self { walk, pass, shown, tone: Tone::for_mesh(mesh), size, target, gpu })
     }

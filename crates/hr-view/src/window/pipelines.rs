@@ -1,38 +1,14 @@
-//! How a scene is drawn: shader, layouts, pipelines, and intermediate targets.
+//! How a scene is drawn: pipelines, and intermediate targets.
 
+use super::frame::Frame;
 use super::gpu::{DEPTH, Gpu};
+use super::layouts::Layouts;
 use super::overlay::Overlay;
-use super::scene_buffers::{Frame, GLOSSY_ATTRIBUTES, SceneBuffers, VERTEX_ATTRIBUTES, Vertex};
+use super::scene_buffers::{
+    GLOSSY_ATTRIBUTES, ListBuffers, ORIENTED_ATTRIBUTES, Oriented, SceneBuffers, VERTEX_ATTRIBUTES, Vertex,
+};
+use super::sight::Sight;
 use glossy_ext::Rgb;
-
-/// What all scenes and output formats share.
-pub(super) struct Layouts {
-    pub(super) frame: wgpu::BindGroupLayout,
-    pub(super) material: wgpu::BindGroupLayout,
-    /// Without and with a texture.
-    scene: [wgpu::PipelineLayout; 2],
-    shader: wgpu::ShaderModule,
-}
-
-impl Layouts {
-    pub(super) fn new(gpu: &Gpu) -> Self {
-        let device = &gpu.device;
-        let frame = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("frame"),
-            entries: &[uniform_entry(0, wgpu::ShaderStages::VERTEX_FRAGMENT)],
-        });
-        let material = material_layout(device);
-        let layout = |groups: &[Option<&wgpu::BindGroupLayout>]| {
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("scene"),
-                bind_group_layouts: groups,
-                immediate_size: 0,
-            })
-        };
-        let scene = [layout(&[Some(&frame)]), layout(&[Some(&frame), Some(&material)])];
-        Self { frame, material, scene, shader: device.create_shader_module(wgpu::include_wgsl!("scene.wgsl")) }
-    }
-}
 
 /// Pipelines and intermediate targets for one output format.
 pub(super) struct Pass {
@@ -41,6 +17,8 @@ pub(super) struct Pass {
     /// Without and with a texture.
     diffuse: [wgpu::RenderPipeline; 2],
     glossy: [wgpu::RenderPipeline; 2],
+    /// For light at pixels, where the device can.
+    sampled: Option<[wgpu::RenderPipeline; 2]>,
     overlay: Overlay,
     /// Chunks to be drawn, by their distance; kept for its memory.
     order: Vec<(f32, usize)>,
@@ -57,7 +35,8 @@ struct Targets {
 
 impl Pass {
     pub(super) fn new(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat, samples: u32) -> Self {
-        let pipeline = |entry: &str,
+        let pipeline = |shader: &wgpu::ShaderModule,
+                        entry: &str,
                         fragment: &str,
                         layout: &wgpu::PipelineLayout,
                         buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
@@ -65,7 +44,7 @@ impl Pass {
                 label: Some(entry),
                 layout: Some(layout),
                 vertex: wgpu::VertexState {
-                    module: &layouts.shader,
+                    module: shader,
                     entry_point: Some(entry),
                     compilation_options: wgpu::PipelineCompilationOptions::default(),
                     buffers,
@@ -83,7 +62,7 @@ impl Pass {
                 }),
                 multisample: wgpu::MultisampleState { count: samples, ..wgpu::MultisampleState::default() },
                 fragment: Some(wgpu::FragmentState {
-                    module: &layouts.shader,
+                    module: shader,
                     entry_point: Some(fragment),
                     compilation_options: wgpu::PipelineCompilationOptions::default(),
                     targets: &[Some(format.into())],
@@ -97,20 +76,32 @@ impl Pass {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &VERTEX_ATTRIBUTES,
         });
-        let following = Some(wgpu::VertexBufferLayout {
-            array_stride: size_of::<Rgb>() as u64,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &GLOSSY_ATTRIBUTES,
-        });
-        let both = |list: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
-            [("plain", &layouts.scene[0]), ("textured", &layouts.scene[1])]
-                .map(|(kind, layout)| pipeline(&format!("{list}_{kind}"), &format!("{kind}_fragment"), layout, buffers))
+        let beside = |stride: usize, attributes| {
+            Some(wgpu::VertexBufferLayout {
+                array_stride: stride as u64,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes,
+            })
         };
+        let following = beside(size_of::<Rgb>(), &GLOSSY_ATTRIBUTES);
+        let oriented = beside(size_of::<Oriented>(), &ORIENTED_ATTRIBUTES);
+        let both = |list: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
+            [("plain", &layouts.scene[0]), ("textured", &layouts.scene[1])].map(|(kind, layout)| {
+                pipeline(&layouts.shader, &format!("{list}_{kind}"), &format!("{kind}_fragment"), layout, buffers)
+            })
+        };
+        let sampled = layouts.sampled.as_ref().map(|sampled| {
+            [("plain", &sampled.scene[0]), ("textured", &sampled.scene[1])].map(|(kind, layout)| {
+                let fragment = format!("sampled_{kind}_fragment");
+                pipeline(&sampled.shader, "sampled", &fragment, layout, &[fixed.clone(), oriented.clone()])
+            })
+        });
         Self {
             format,
             samples,
             diffuse: both("diffuse", std::slice::from_ref(&fixed)),
             glossy: both("glossy", &[fixed.clone(), following]),
+            sampled,
             overlay: Overlay::new(gpu, layouts, format, samples),
             order: Vec::new(),
             targets: None,
@@ -158,35 +149,49 @@ impl Pass {
         });
         let sight = frame.view.sight(frame.mesh.origin, f64::from(size[0]) / f64::from(size[1]));
         pass.set_bind_group(0, &scene.frame_group, &[]);
-        for (list, pipelines, follows) in [(&scene.diffuse, &self.diffuse, false), (&scene.glossy, &self.glossy, true)]
-        {
-            if list.chunks.is_empty() {
-                continue;
-            }
-            pass.set_vertex_buffer(0, list.vertices.slice(..));
-            if follows {
-                pass.set_vertex_buffer(1, scene.glossy_radiance.slice(..));
-            }
-            pass.set_index_buffer(list.indices.slice(..), wgpu::IndexFormat::Uint32);
-            // The nearest first, so that what is hidden is not shaded.
-            self.order.clear();
-            let seen = list.chunks.iter().enumerate().filter(|(_, chunk)| chunk.may_be_seen(&sight));
-            self.order.extend(seen.map(|(i, chunk)| (chunk.distance(&sight), i)));
-            self.order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-            let mut last = None;
-            for &(_, i) in &self.order {
-                let chunk = &list.chunks[i];
-                if last != Some(chunk.texture) {
-                    last = Some(chunk.texture);
-                    pass.set_pipeline(&pipelines[usize::from(chunk.texture.is_some())]);
-                    if let Some(texture) = chunk.texture {
-                        pass.set_bind_group(1, &scene.materials[texture as usize], &[]);
-                    }
-                }
-                pass.draw_indexed(chunk.indices.clone(), 0, 0..1);
-            }
+        let diffuse = scene.diffuse.iter().map(|list| (list, &self.diffuse));
+        let glossy = scene.glossy.iter().map(|list| (list, &self.glossy));
+        let sampled = scene.sampled.iter().filter_map(|list| Some((list, self.sampled.as_ref()?)));
+        for (list, pipelines) in diffuse.chain(glossy).chain(sampled) {
+            draw_list(&mut pass, list, pipelines, &scene.materials, &sight, &mut self.order);
         }
         self.overlay.draw(&mut pass, frame.marks);
+    }
+}
+
+/// Draws what may be seen of a list.
+fn draw_list(
+    pass: &mut wgpu::RenderPass<'_>,
+    list: &ListBuffers,
+    pipelines: &[wgpu::RenderPipeline; 2],
+    materials: &[wgpu::BindGroup],
+    sight: &Sight,
+    order: &mut Vec<(f32, usize)>,
+) {
+    pass.set_vertex_buffer(0, list.vertices.slice(..));
+    if let Some(beside) = &list.beside {
+        pass.set_vertex_buffer(1, beside.slice(..));
+    }
+    if let Some(samples) = &list.samples {
+        pass.set_bind_group(2, samples, &[]);
+    }
+    pass.set_index_buffer(list.indices.slice(..), wgpu::IndexFormat::Uint32);
+    // The nearest first, so that what is hidden is not shaded.
+    order.clear();
+    let seen = list.chunks.iter().enumerate().filter(|(_, chunk)| chunk.may_be_seen(sight));
+    order.extend(seen.map(|(i, chunk)| (chunk.distance(sight), i)));
+    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let mut last = None;
+    for &(_, i) in &*order {
+        let chunk = &list.chunks[i];
+        if last != Some(chunk.texture) {
+            last = Some(chunk.texture);
+            pass.set_pipeline(&pipelines[usize::from(chunk.texture.is_some())]);
+            if let Some(texture) = chunk.texture {
+                pass.set_bind_group(1, &materials[texture as usize], &[]);
+            }
+        }
+        pass.draw_indexed(chunk.indices.clone(), 0, 0..1);
     }
 }
 
@@ -203,37 +208,4 @@ fn target(gpu: &Gpu, [width, height]: [u32; 2], sample_count: u32, format: wgpu:
         view_formats: &[],
     });
     texture.create_view(&wgpu::TextureViewDescriptor::default())
-}
-
-fn uniform_entry(binding: u32, visibility: wgpu::ShaderStages) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility,
-        ty: wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        count: None,
-    }
-}
-
-fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry =
-        |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None };
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("material"),
-        entries: &[
-            entry(
-                0,
-                wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                },
-            ),
-            entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
-            uniform_entry(2, wgpu::ShaderStages::FRAGMENT),
-        ],
-    })
 }

@@ -144,10 +144,13 @@ fn plain_fragment(in: Plain) -> @location(0) vec4f {
     return shown(in.value);
 }
 
+fn texel_at(uv: vec2f) -> vec3f {
+    let place = vec3f(uv, 1.0);
+    return textureSample(texels, texel_sampler, vec2f(dot(placement.u.xyz, place), dot(placement.v.xyz, place))).rgb;
+}
+
 @fragment
 fn textured_fragment(in: Textured) -> @location(0) vec4f {
-    let place = vec3f(in.uv, 1.0);
-    let texel = textureSample(texels, texel_sampler, vec2f(dot(placement.u.xyz, place), dot(placement.v.xyz, place)));
     // Irradiance is that of what is under the texture.
-    return shown(in.diffuse * select(texel.rgb, vec3f(1.0), frame.luminance.w > 2.5) + in.other);
+    return shown(in.diffuse * select(texel_at(in.uv), vec3f(1.0), frame.luminance.w > 2.5) + in.other);
 }
