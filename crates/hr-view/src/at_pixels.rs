@@ -18,12 +18,18 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 /// What tells whether a lobe is narrow: its width toward this direction.
 const ASLANT: Vec3 = Vec3::new(0.6, 0.0, 0.8);
 
+/// In narrow lobes one sees that senders, which lie side by side, count as disks. So much wider they close the gaps between
+/// them: where they are equal each direction is in two of them on average.
+const OVERLAP: f32 = 1.5;
+
 /// Flag of [`Leaf::material`]: the base colour is that of vertices and texture.
 pub const VARIES: u32 = 1 << 31;
 /// Flags of [`Arrival::kind`]: a sender at infinity; irradiance on the receiver's own plane.
 pub const DISTANT: u32 = 1;
 /// See [`DISTANT`].
 pub const ORIENTED: u32 = 2;
+/// Flag of [`Arrival::kind`]: a sender that shines, whose outline is seen in what mirrors it.
+pub const SHINES: u32 = 4;
 
 /// A leaf (12 bytes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -53,7 +59,7 @@ pub struct Run {
 pub struct Arrival {
     /// The sender's middle relative to the mesh's origin; the direction toward it where it is [`DISTANT`].
     pub center: [f32; 3],
-    /// [`DISTANT`], [`ORIENTED`].
+    /// [`DISTANT`], [`ORIENTED`], [`SHINES`].
     pub kind: u32,
     /// Radius of a ball that holds the sender.
     pub radius: f32,
@@ -97,6 +103,8 @@ pub struct AtPixels {
     pub parts: Vec<Part>,
     /// Materials: see [`Reflectors::add`].
     pub reflectors: Vec<[f32; 4]>,
+    /// Which kinds of lobes they have: bit k for those of kind k.
+    pub kinds: u32,
     /// Base colours at the mesh's vertices, to be multiplied by the texture's; where a colour does not vary it is not looked at.
     pub colors: Vec<Rgb>,
     /// Names of the materials whose light stays at vertices: mirrors, and those that are no formula.
@@ -136,7 +144,7 @@ impl AtPixels {
             .collect();
         let mut parts = Vec::new();
         divided(&triangles, most, &mut parts, &|triangles| Builder::new(solved, origin).part(triangles, &material_of));
-        Self { parts, reflectors: reflectors.0, colors, left }
+        Self { parts, reflectors: reflectors.numbers, kinds: reflectors.kinds, colors, left }
     }
 }
 
@@ -228,10 +236,12 @@ fn arrival(solved: &Solved, origin: DVec3, receiver: NodeId, sample: &Illuminati
     let radius = element.radius * unit;
     let distance = element.center.distance(at) * unit;
     let center = if is_distant { direction } else { (scene.normalization.to_scene(element.center) - origin).as_vec3() };
+    let shines = element.is_patch() && solved.scene.materials[element.material as usize].exitance != Rgb::ZERO;
+    let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
     let Facing { mean, diagonal, mixed } = element.facing;
     Arrival {
         center: center.to_array(),
-        kind: if is_distant { DISTANT } else { 0 } | if sample.is_oriented() { ORIENTED } else { 0 },
+        kind: flag(is_distant, DISTANT) | flag(sample.is_oriented(), ORIENTED) | flag(shines, SHINES),
         radius,
         area: element.area * unit * unit * FRAC_1_PI,
         spread: distance * distance + radius * radius,
@@ -243,23 +253,27 @@ fn arrival(solved: &Solved, origin: DVec3, receiver: NodeId, sample: &Illuminati
 
 /// Reflectors as the shader reads them.
 #[derive(Default)]
-struct Reflectors(Vec<[f32; 4]>);
+struct Reflectors {
+    numbers: Vec<[f32; 4]>,
+    kinds: u32,
+}
 
 impl Reflectors {
     /// Adds a reflector: a head of two, three for each of its lobes, and the tables of losses. Where it begins; `None` where
     /// it is no formula, or a mirror, which samples cannot show.
     ///
-    /// The head has the number of lobes, the least extent of senders, whether there is a grain, and the grain. A lobe has
+    /// The head has the number of lobes, the least extent of senders, whether there is a grain, what extents of senders that
+    /// do not shine are multiplied by, and the grain. A lobe has
     /// its kind and roughness (or exponent), its colour and how metallic it is, and the stretch of its slopes or the mean of
     /// its losses and where their table is.
     fn add(&mut self, reflector: &dyn Reflector) -> Option<u32> {
         let lobes = reflector.formulas().filter(|_| reflector.mirror() == Rgb::ZERO)?;
-        let begin = self.0.len();
+        let begin = self.numbers.len();
         let is_narrow = reflector.lobe(ASLANT).width < FOLLOWED;
         let grain = reflector.grain();
-        let narrowest = if is_narrow { NARROWEST } else { 0.0 };
-        self.0.push([lobes.len() as f32, narrowest, if grain.is_some() { 1.0 } else { 0.0 }, 0.0]);
-        self.0.push(Vec4::from((grain.unwrap_or(Vec3::ZERO), 0.0)).to_array());
+        let (narrowest, overlap) = if is_narrow { (NARROWEST, OVERLAP) } else { (0.0, 1.0) };
+        self.numbers.push([lobes.len() as f32, narrowest, if grain.is_some() { 1.0 } else { 0.0 }, overlap]);
+        self.numbers.push(Vec4::from((grain.unwrap_or(Vec3::ZERO), 0.0)).to_array());
         let mut table = begin + 2 + 3 * lobes.len();
         let mut tables = Vec::new();
         for lobe in lobes {
@@ -276,13 +290,14 @@ impl Reflectors {
                     (3.0, alpha, base, metallic, last)
                 }
                 _ => {
-                    self.0.truncate(begin);
+                    self.numbers.truncate(begin);
                     return None;
                 }
             };
-            self.0.extend([[kind, shape, 0.0, 0.0], Vec4::from((color, metallic)).to_array(), last]);
+            self.kinds |= 1 << kind as u32;
+            self.numbers.extend([[kind, shape, 0.0, 0.0], Vec4::from((color, metallic)).to_array(), last]);
         }
-        self.0.append(&mut tables);
+        self.numbers.append(&mut tables);
         Some(begin as u32)
     }
 }

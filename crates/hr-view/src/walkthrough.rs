@@ -25,6 +25,8 @@ pub struct Walkthrough {
     mesh: DisplayMesh,
     /// Per entry of the mesh's `glossy`.
     sources: Vec<Source>,
+    /// Where each of them is, in unit space.
+    places: Vec<Vec3>,
     /// The leaf of each triangle.
     triangles: Vec<u32>,
     /// The leaves around each of them with their shares, each leaf once: those of entry i are at `first[i]..first[i + 1]`.
@@ -39,6 +41,11 @@ impl Walkthrough {
     #[must_use]
     pub fn new(solved: Arc<Solved>, mode: Mode) -> Self {
         let Facets { mesh, sources, leaves: triangles } = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
+        let place = |source: &Source| {
+            let surface = solved.solution.elements.nodes[source.leaf as usize].source;
+            solved.solution.scene.surfaces()[surface as usize].point(source.uv)
+        };
+        let places = sources.iter().map(place).collect();
         let (mut leaves, mut first) = (Vec::new(), vec![0]);
         let mut around = Vec::new();
         for source in &sources {
@@ -54,18 +61,18 @@ impl Walkthrough {
             }
             first.push(leaves.len() as u32);
         }
-        Self { solved, mode, mesh, sources, triangles, leaves, first }
+        Self { solved, mode, mesh, sources, places, triangles, leaves, first }
     }
 
     /// Glossy radiance of a vertex toward an eye in unit space.
     fn radiance(&self, eye: Vec3, slot: usize, scratch: &mut Vec<Incident>) -> Rgb {
         let solution = &self.solved.solution;
-        let source = &self.sources[slot];
-        let surface = solution.elements.nodes[source.leaf as usize].source;
-        let at = solution.scene.surfaces()[surface as usize].point(source.uv);
+        let at = self.places[slot];
         let away = (eye - at).normalize_or_zero();
         let normal = self.mesh.normals[self.mesh.glossy[slot] as usize];
         if self.mode == Mode::Samples {
+            let source = &self.sources[slot];
+            let surface = solution.elements.nodes[source.leaf as usize].source;
             let material = &self.solved.scene.materials[solution.scene.surface_materials[surface as usize] as usize];
             if material.reflector.mirror() == Rgb::ZERO {
                 let color = self.solved.scene.base_color(surface, source.uv.x, source.uv.y);

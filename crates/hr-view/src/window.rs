@@ -31,7 +31,7 @@ mod tour;
 mod view;
 mod walker;
 
-pub use offscreen::{FrameCost, Offscreen};
+pub use offscreen::{Begun, FrameCost, Offscreen};
 pub use screen::{Screen, Status, Wish};
 pub use snapshot::Snapshot;
 pub use tone::{Curve, Tone};

@@ -49,9 +49,9 @@ impl Chunk {
         sight.sides.iter().all(|side| side.dot(to_eye) <= self.radius) && self.may_face(to_eye)
     }
 
-    /// From the eye to where it may begin; negative inside.
+    /// From the eye to its middle: of what is large, such as a wall, most is not near though some may be.
     pub(super) fn distance(&self, sight: &Sight) -> f32 {
-        self.center.distance(sight.eye) - self.radius
+        self.center.distance(sight.eye)
     }
 
     fn may_face(&self, to_eye: Vec3) -> bool {

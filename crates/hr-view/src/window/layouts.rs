@@ -3,6 +3,7 @@
 use super::gpu::Gpu;
 
 /// What all scenes and output formats share.
+#[derive(Clone)]
 pub(super) struct Layouts {
     pub(super) frame: wgpu::BindGroupLayout,
     pub(super) material: wgpu::BindGroupLayout,
@@ -14,6 +15,7 @@ pub(super) struct Layouts {
 }
 
 /// The same where samples are reflected at the pixel.
+#[derive(Clone)]
 pub(super) struct SampledLayouts {
     pub(super) samples: wgpu::BindGroupLayout,
     pub(super) scene: [wgpu::PipelineLayout; 2],

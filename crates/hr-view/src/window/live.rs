@@ -3,7 +3,7 @@
 use super::canvas::{Canvas, Output};
 use super::frame::Frame;
 use super::gauge::Gauge;
-use super::gpu::Gpu;
+use super::gpu::{Gpu, one_line};
 use super::hud::{Facts, Hud, Settings};
 use super::input::{Command, command};
 use super::layouts::Layouts;
@@ -42,6 +42,11 @@ const STILL: f64 = 3.0;
 /// then; when it comes to rest, all are made exact.
 const MOVING: f32 = 0.017_453_3;
 
+/// Glossy light is computed at pixels, unless somebody insists, where a frame is thought to take no longer than this. It
+/// is measured with a picture of this size.
+const LONGEST: Duration = Duration::from_millis(250);
+const TRIAL: [u32; 2] = [128, 80];
+
 /// Whether to go on.
 pub(super) enum Next {
     Go,
@@ -70,6 +75,8 @@ pub(super) struct Live {
     shown: Shown,
     /// Whether glossy light is wanted the other way round than the solution prefers it, as who prepares solutions knows it.
     is_turned: Arc<AtomicBool>,
+    /// Whether somebody has chosen himself where it is computed.
+    has_chosen: bool,
     automatic: Tone,
     gauge: Gauge,
     looking: Looking,
@@ -139,6 +146,7 @@ impl Live {
             walk,
             shown,
             is_turned: Arc::default(),
+            has_chosen: false,
             window,
             gpu,
             canvas,
@@ -207,7 +215,17 @@ impl Live {
         }
         self.window.set_title(&title(walk.name(), &self.status));
         self.walk = walk;
-        if wants_pixels && is_first {
+        if wants_pixels && !self.has_chosen && self.shown.left.is_some() {
+            let frame = self.frame_at_pixels()?;
+            if frame > LONGEST {
+                self.set_pixels(false)?;
+                let seconds = frame.as_secs_f64();
+                self.hud
+                    .say(format!("at pixels a frame takes {seconds:.1} s here: glossy light at vertices, K insists"));
+            } else if is_first {
+                self.tell_of_pixels();
+            }
+        } else if wants_pixels && is_first {
             self.tell_of_pixels();
         }
         self.gauge.high = self.gauge.quantity.high(self.walk.mesh());
@@ -217,15 +235,56 @@ impl Live {
     /// Shows glossy light at pixels instead of vertices, or the other way round.
     fn turn_pixels(&mut self) -> Result<(), WindowError> {
         let wants_pixels = self.shown.left.is_none();
-        let parts = Parts::new(self.walk.as_ref(), self.gpu.capacity(), wants_pixels);
-        self.is_turned.store(wants_pixels != self.walk.prefers_pixels(), Ordering::Relaxed);
-        self.shown = Shown::new(&self.gpu, &self.layouts, self.walk.as_ref(), parts)?;
+        self.has_chosen = true;
+        self.set_pixels(wants_pixels)?;
         if wants_pixels {
             self.tell_of_pixels();
         } else {
             self.hud.say("glossy light at vertices".to_owned());
         }
         Ok(())
+    }
+
+    fn set_pixels(&mut self, wants_pixels: bool) -> Result<(), WindowError> {
+        let parts = Parts::new(self.walk.as_ref(), self.gpu.capacity(), wants_pixels);
+        self.is_turned.store(wants_pixels != self.walk.prefers_pixels(), Ordering::Relaxed);
+        self.shown = Shown::new(&self.gpu, &self.layouts, self.walk.as_ref(), parts)?;
+        Ok(())
+    }
+
+    /// How long a frame takes with the light that is at pixels, by a small picture of what is seen now.
+    fn frame_at_pixels(&mut self) -> Result<Duration, WindowError> {
+        let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("trial"),
+            size: wgpu::Extent3d { width: TRIAL[0], height: TRIAL[1], depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: self.canvas.format(),
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+            view_formats: &[],
+        });
+        let target = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let (tone, mut took) = (self.tone(), Duration::ZERO);
+        let frame = Frame {
+            view: &self.walker.view,
+            tone: &tone,
+            mesh: self.walk.mesh(),
+            gauge: Gauge::OFF,
+            marks: self.looking.marks(),
+        };
+        // The first one makes the device compile its shaders.
+        for _ in 0..2 {
+            let begin = Instant::now();
+            let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            self.pass.draw(&self.gpu, &self.shown.buffers, &mut encoder, &target, TRIAL, &frame);
+            self.gpu.queue.submit([encoder.finish()]);
+            let waited = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+            waited.map_err(|error| WindowError::Device(one_line(&error)))?;
+            took = begin.elapsed();
+        }
+        let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+        Ok(took.mul_f64((pixels(self.canvas.size()) / pixels(TRIAL)).max(1.0)))
     }
 
     /// Says what has become of the wish for glossy light at pixels.

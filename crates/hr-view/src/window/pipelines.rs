@@ -1,27 +1,23 @@
 //! How a scene is drawn: pipelines, and intermediate targets.
 
 use super::frame::Frame;
+use super::gauge::Quantity;
 use super::gpu::{DEPTH, Gpu};
 use super::layouts::Layouts;
 use super::overlay::Overlay;
-use super::scene_buffers::{
-    GLOSSY_ATTRIBUTES, ListBuffers, ORIENTED_ATTRIBUTES, Oriented, SceneBuffers, VERTEX_ATTRIBUTES, Vertex,
-};
-use super::sight::Sight;
+use super::scene_buffers::{GLOSSY_ATTRIBUTES, ORIENTED_ATTRIBUTES, Oriented, SceneBuffers, VERTEX_ATTRIBUTES, Vertex};
 use glossy_ext::Rgb;
 
 /// Pipelines and intermediate targets for one output format.
 pub(super) struct Pass {
+    layouts: Layouts,
     format: wgpu::TextureFormat,
     samples: u32,
-    /// Without and with a texture.
-    diffuse: [wgpu::RenderPipeline; 2],
-    glossy: [wgpu::RenderPipeline; 2],
-    /// For light at pixels, where the device can.
-    sampled: Option<[wgpu::RenderPipeline; 2]>,
+    /// Those of the last frame.
+    pipelines: Option<Pipelines>,
     overlay: Overlay,
-    /// Chunks to be drawn, by their distance; kept for its memory.
-    order: Vec<(f32, usize)>,
+    /// Distances of the chunks to be drawn, and which they are of which list; kept for its memory.
+    order: Vec<(f32, usize, usize)>,
     targets: Option<Targets>,
 }
 
@@ -33,20 +29,40 @@ struct Targets {
     color: Option<wgpu::TextureView>,
 }
 
-impl Pass {
-    pub(super) fn new(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat, samples: u32) -> Self {
+/// For each list, without and with a texture.
+struct Pipelines {
+    /// What of shaders is fixed: false colours, and kinds of lobes.
+    fixed: (bool, u32),
+    diffuse: [wgpu::RenderPipeline; 2],
+    glossy: [wgpu::RenderPipeline; 2],
+    /// For light at pixels, where the device can.
+    sampled: Option<[wgpu::RenderPipeline; 2]>,
+}
+
+impl Pipelines {
+    fn new(
+        gpu: &Gpu,
+        layouts: &Layouts,
+        format: wgpu::TextureFormat,
+        samples: u32,
+        (false_colors, kinds): (bool, u32),
+    ) -> Self {
+        // Software devices compute both sides of a condition, whatever it is.
+        let constants = [("FALSE_COLORS", if false_colors { 1.0 } else { 0.0 }), ("KINDS", f64::from(kinds))];
         let pipeline = |shader: &wgpu::ShaderModule,
+                        constants: &[(&str, f64)],
                         entry: &str,
                         fragment: &str,
                         layout: &wgpu::PipelineLayout,
                         buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
+            let options = wgpu::PipelineCompilationOptions { constants, ..Default::default() };
             gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(entry),
                 layout: Some(layout),
                 vertex: wgpu::VertexState {
                     module: shader,
                     entry_point: Some(entry),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    compilation_options: options.clone(),
                     buffers,
                 },
                 primitive: wgpu::PrimitiveState {
@@ -64,14 +80,14 @@ impl Pass {
                 fragment: Some(wgpu::FragmentState {
                     module: shader,
                     entry_point: Some(fragment),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    compilation_options: options.clone(),
                     targets: &[Some(format.into())],
                 }),
                 multiview_mask: None,
                 cache: None,
             })
         };
-        let fixed = Some(wgpu::VertexBufferLayout {
+        let whole = Some(wgpu::VertexBufferLayout {
             array_stride: size_of::<Vertex>() as u64,
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &VERTEX_ATTRIBUTES,
@@ -87,21 +103,38 @@ impl Pass {
         let oriented = beside(size_of::<Oriented>(), &ORIENTED_ATTRIBUTES);
         let both = |list: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
             [("plain", &layouts.scene[0]), ("textured", &layouts.scene[1])].map(|(kind, layout)| {
-                pipeline(&layouts.shader, &format!("{list}_{kind}"), &format!("{kind}_fragment"), layout, buffers)
+                pipeline(
+                    &layouts.shader,
+                    &constants[..1],
+                    &format!("{list}_{kind}"),
+                    &format!("{kind}_fragment"),
+                    layout,
+                    buffers,
+                )
             })
         };
         let sampled = layouts.sampled.as_ref().map(|sampled| {
             [("plain", &sampled.scene[0]), ("textured", &sampled.scene[1])].map(|(kind, layout)| {
                 let fragment = format!("sampled_{kind}_fragment");
-                pipeline(&sampled.shader, "sampled", &fragment, layout, &[fixed.clone(), oriented.clone()])
+                pipeline(&sampled.shader, &constants, "sampled", &fragment, layout, &[whole.clone(), oriented.clone()])
             })
         });
         Self {
+            fixed: (false_colors, kinds),
+            diffuse: both("diffuse", std::slice::from_ref(&whole)),
+            glossy: both("glossy", &[whole.clone(), following]),
+            sampled,
+        }
+    }
+}
+
+impl Pass {
+    pub(super) fn new(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat, samples: u32) -> Self {
+        Self {
+            layouts: layouts.clone(),
             format,
             samples,
-            diffuse: both("diffuse", std::slice::from_ref(&fixed)),
-            glossy: both("glossy", &[fixed.clone(), following]),
-            sampled,
+            pipelines: None,
             overlay: Overlay::new(gpu, layouts, format, samples),
             order: Vec::new(),
             targets: None,
@@ -149,49 +182,41 @@ impl Pass {
         });
         let sight = frame.view.sight(frame.mesh.origin, f64::from(size[0]) / f64::from(size[1]));
         pass.set_bind_group(0, &scene.frame_group, &[]);
-        let diffuse = scene.diffuse.iter().map(|list| (list, &self.diffuse));
-        let glossy = scene.glossy.iter().map(|list| (list, &self.glossy));
-        let sampled = scene.sampled.iter().filter_map(|list| Some((list, self.sampled.as_ref()?)));
-        for (list, pipelines) in diffuse.chain(glossy).chain(sampled) {
-            draw_list(&mut pass, list, pipelines, &scene.materials, &sight, &mut self.order);
+        let fixed = (frame.gauge.quantity != Quantity::Picture, scene.kinds);
+        let pipelines = match self.pipelines.take().filter(|pipelines| pipelines.fixed == fixed) {
+            Some(pipelines) => pipelines,
+            None => Pipelines::new(gpu, &self.layouts, self.format, self.samples, fixed),
+        };
+        let pipelines = &*self.pipelines.insert(pipelines);
+        let diffuse = scene.diffuse.iter().map(|list| (list, &pipelines.diffuse));
+        let glossy = scene.glossy.iter().map(|list| (list, &pipelines.glossy));
+        let sampled = scene.sampled.iter().filter_map(|list| Some((list, pipelines.sampled.as_ref()?)));
+        let lists: Vec<_> = diffuse.chain(glossy).chain(sampled).collect();
+        // The nearest first, so that what is hidden is not shaded.
+        self.order.clear();
+        for (at, (list, _)) in lists.iter().enumerate() {
+            let seen = list.chunks.iter().enumerate().filter(|(_, chunk)| chunk.may_be_seen(&sight));
+            self.order.extend(seen.map(|(i, chunk)| (chunk.distance(&sight), at, i)));
+        }
+        self.order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut last_list, mut last_texture) = (None, None);
+        for &(_, at, i) in &self.order {
+            let (list, pipelines) = lists[at];
+            let chunk = &list.chunks[i];
+            if last_list != Some(at) {
+                (last_list, last_texture) = (Some(at), None);
+                list.bind(&mut pass);
+            }
+            if last_texture != Some(chunk.texture) {
+                last_texture = Some(chunk.texture);
+                pass.set_pipeline(&pipelines[usize::from(chunk.texture.is_some())]);
+                if let Some(texture) = chunk.texture {
+                    pass.set_bind_group(1, &scene.materials[texture as usize], &[]);
+                }
+            }
+            pass.draw_indexed(chunk.indices.clone(), 0, 0..1);
         }
         self.overlay.draw(&mut pass, frame.marks);
-    }
-}
-
-/// Draws what may be seen of a list.
-fn draw_list(
-    pass: &mut wgpu::RenderPass<'_>,
-    list: &ListBuffers,
-    pipelines: &[wgpu::RenderPipeline; 2],
-    materials: &[wgpu::BindGroup],
-    sight: &Sight,
-    order: &mut Vec<(f32, usize)>,
-) {
-    pass.set_vertex_buffer(0, list.vertices.slice(..));
-    if let Some(beside) = &list.beside {
-        pass.set_vertex_buffer(1, beside.slice(..));
-    }
-    if let Some(samples) = &list.samples {
-        pass.set_bind_group(2, samples, &[]);
-    }
-    pass.set_index_buffer(list.indices.slice(..), wgpu::IndexFormat::Uint32);
-    // The nearest first, so that what is hidden is not shaded.
-    order.clear();
-    let seen = list.chunks.iter().enumerate().filter(|(_, chunk)| chunk.may_be_seen(sight));
-    order.extend(seen.map(|(i, chunk)| (chunk.distance(sight), i)));
-    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let mut last = None;
-    for &(_, i) in &*order {
-        let chunk = &list.chunks[i];
-        if last != Some(chunk.texture) {
-            last = Some(chunk.texture);
-            pass.set_pipeline(&pipelines[usize::from(chunk.texture.is_some())]);
-            if let Some(texture) = chunk.texture {
-                pass.set_bind_group(1, &materials[texture as usize], &[]);
-            }
-        }
-        pass.draw_indexed(chunk.indices.clone(), 0, 0..1);
     }
 }
 

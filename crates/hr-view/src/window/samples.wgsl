@@ -5,11 +5,15 @@
 const VARIES = 0x80000000u;
 const DISTANT = 1u;
 const ORIENTED = 2u;
+const SHINES = 4u;
 const HORIZON = 1e-6;
 const MOST_RENEWAL = 4.0;
 const DIELECTRIC_F0 = 0.04;
 const MEAN_W = 0.00368455;
 const LOSSES = 33u;
+
+// Bits of the kinds of lobes that there are: the others cost nothing.
+override KINDS: u32 = 15u;
 
 struct Leaf {
     first: u32,
@@ -329,18 +333,21 @@ fn reflected(place: u32, disk: Disk, outgoing: vec3f, own_color: bool, color: ve
     let shape = reflectors[place];
     let tint = reflectors[place + 1u];
     let last = reflectors[place + 2u];
-    if shape.x < 0.5 {
+    if (KINDS & 1u) != 0u && shape.x < 0.5 {
         return tint.rgb * phong(disk, vec3f(-outgoing.xy, outgoing.z), shape.y);
     }
-    if shape.x < 1.5 {
+    if (KINDS & 2u) != 0u && shape.x < 1.5 {
         return tint.rgb * ward(disk, outgoing, shape.y, last.xy);
+    }
+    if (KINDS & 12u) == 0u {
+        return vec3f(0.0);
     }
     let base = select(clamp(color, vec3f(0.0), vec3f(1.0)), tint.rgb, own_color);
     let metallic = tint.w;
     let f0 = DIELECTRIC_F0 * (1.0 - metallic) + base * metallic;
     let found = ggx(disk, outgoing, shape.y);
     let single = f0 * (found.x * (1.0 - found.y)) + found.x * found.y;
-    if shape.x < 2.5 {
+    if (KINDS & 8u) == 0u || shape.x < 2.5 {
         return single + base * ((1.0 - metallic) / PI * (1.0 - DIELECTRIC_F0) * (MEAN_W - found.z));
     }
     let mean = last.xy;
@@ -387,7 +394,8 @@ fn glossy(in: Sampled, color: vec3f) -> vec3f {
         let run = runs[i];
         for (var k = run.x; k < run.y; k++) {
             let incident = arrived(arrivals[k], in.point, axes);
-            let disk = disk_of(incident.direction, max(incident.extent, head.y));
+            let overlap = select(head.w, 1.0, (arrivals[k].kind & SHINES) != 0u);
+            let disk = disk_of(incident.direction, max(incident.extent * overlap, head.y));
             if disk.mean_cos > 0.0 && any(incident.irradiance > vec3f(0.0)) {
                 for (var lobe = 0u; lobe < lobes; lobe++) {
                     sum += incident.irradiance * reflected(material + 2u + 3u * lobe, disk, outgoing, own_color, color);

@@ -60,6 +60,8 @@ pub(super) struct SceneBuffers {
     pub(super) diffuse: Vec<ListBuffers>,
     pub(super) glossy: Vec<ListBuffers>,
     pub(super) sampled: Vec<ListBuffers>,
+    /// Kinds of lobes that its samples are reflected by ([`AtPixels::kinds`](crate::at_pixels::AtPixels::kinds)).
+    pub(super) kinds: u32,
     /// Per texture.
     pub(super) materials: Vec<wgpu::BindGroup>,
     pub(super) frame: wgpu::Buffer,
@@ -92,15 +94,19 @@ impl SceneBuffers {
         let mut sampled = Vec::new();
         if let (Some(light), Some(layouts)) = (&parts.at_pixels, &layouts.sampled) {
             let reflectors = storage(gpu, "reflectors", &light.reflectors);
-            for part in &parts.sampled {
-                let list = ListBuffers::new(gpu, mesh, &part.0)?;
-                sampled.push(list.with_samples(gpu, &layouts.samples, mesh, part, &light.colors, &reflectors)?);
+            for (lists, samples) in &parts.sampled {
+                let group = samples_group(gpu, &layouts.samples, samples, &reflectors);
+                for part in lists {
+                    let list = ListBuffers::new(gpu, mesh, part)?;
+                    sampled.push(list.with_samples(gpu, mesh, part, &light.colors, &group)?);
+                }
             }
         }
         Ok(Self {
             diffuse,
             glossy,
             sampled,
+            kinds: parts.at_pixels.as_ref().map_or(0, |light| light.kinds),
             materials,
             frame,
             frame_group,
@@ -147,32 +153,31 @@ impl ListBuffers {
     fn with_samples(
         self,
         gpu: &Gpu,
-        layout: &wgpu::BindGroupLayout,
         mesh: &DisplayMesh,
-        (chunked, samples): &(Chunked, Part),
+        part: &Chunked,
         colors: &[Rgb],
-        reflectors: &wgpu::Buffer,
+        group: &wgpu::BindGroup,
     ) -> Result<Self, WindowError> {
-        let oriented = chunked.list.vertices.iter().zip(&chunked.list.leaves).map(|(&v, &leaf)| Oriented {
+        let oriented = part.list.vertices.iter().zip(&part.list.leaves).map(|(&v, &leaf)| Oriented {
             normal: mesh.normals[v as usize].to_array(),
             color: colors.get(v as usize).copied().map_or([1.0; 3], |color| finite(color).to_array()),
             leaf,
         });
         let oriented: Vec<Oriented> = oriented.collect();
-        let leaves = storage(gpu, "leaves", &samples.leaves);
-        let runs = storage(gpu, "runs", &samples.runs);
-        let arrivals = storage(gpu, "arrivals", &samples.arrivals);
-        let buffers = [&leaves, &runs, &arrivals, reflectors];
-        let entries = (0..)
-            .zip(buffers)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() });
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("samples"),
-            layout,
-            entries: &entries.collect::<Vec<_>>(),
-        });
         let beside = filled(gpu, "orientation", &oriented, wgpu::BufferUsages::VERTEX)?;
-        Ok(Self { beside: Some(beside), samples: Some(group), ..self })
+        Ok(Self { beside: Some(beside), samples: Some(group.clone()), ..self })
+    }
+
+    /// Makes it what is drawn next.
+    pub(super) fn bind(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_vertex_buffer(0, self.vertices.slice(..));
+        if let Some(beside) = &self.beside {
+            pass.set_vertex_buffer(1, beside.slice(..));
+        }
+        if let Some(samples) = &self.samples {
+            pass.set_bind_group(2, samples, &[]);
+        }
+        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
 
     /// Uploads the radiances of its vertices.
@@ -201,6 +206,27 @@ fn storage<T: Pod>(gpu: &Gpu, label: &'static str, contents: &[T]) -> wgpu::Buff
     let contents = bytemuck::cast_slice(if contents.is_empty() { &nothing } else { contents });
     let usage = wgpu::BufferUsages::STORAGE;
     gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+}
+
+/// What pixels read of some leaves.
+fn samples_group(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    samples: &Part,
+    reflectors: &wgpu::Buffer,
+) -> wgpu::BindGroup {
+    let leaves = storage(gpu, "leaves", &samples.leaves);
+    let runs = storage(gpu, "runs", &samples.runs);
+    let arrivals = storage(gpu, "arrivals", &samples.arrivals);
+    let buffers = [&leaves, &runs, &arrivals, reflectors];
+    let entries = (0..)
+        .zip(buffers)
+        .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() });
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("samples"),
+        layout,
+        entries: &entries.collect::<Vec<_>>(),
+    })
 }
 
 fn material(
