@@ -101,7 +101,12 @@ impl Part {
 pub struct AtPixels {
     /// Leaves whose arrays fit a device together.
     pub parts: Vec<Part>,
-    /// Materials: see [`Reflectors::add`].
+    /// Materials, each a head of two, three for each of its lobes, and tables of losses.
+    ///
+    /// The head has the number of lobes, the least extent of senders, whether there is a grain, what extents of senders that
+    /// do not shine are multiplied by, and the grain. A lobe has its kind (0 Phong, 1 Ward, 2 metallic-roughness, 3
+    /// compensated) and roughness or exponent, its colour and how metallic it is, and the stretch of its slopes or the mean
+    /// of its losses and where their table is.
     pub reflectors: Vec<[f32; 4]>,
     /// Which kinds of lobes they have: bit k for those of kind k.
     pub kinds: u32,
@@ -259,13 +264,8 @@ struct Reflectors {
 }
 
 impl Reflectors {
-    /// Adds a reflector: a head of two, three for each of its lobes, and the tables of losses. Where it begins; `None` where
-    /// it is no formula, or a mirror, which samples cannot show.
-    ///
-    /// The head has the number of lobes, the least extent of senders, whether there is a grain, what extents of senders that
-    /// do not shine are multiplied by, and the grain. A lobe has
-    /// its kind and roughness (or exponent), its colour and how metallic it is, and the stretch of its slopes or the mean of
-    /// its losses and where their table is.
+    /// Adds a reflector, in the form of [`AtPixels::reflectors`]. Where it begins; `None` where it is no formula, or a mirror,
+    /// which samples cannot show.
     fn add(&mut self, reflector: &dyn Reflector) -> Option<u32> {
         let lobes = reflector.formulas().filter(|_| reflector.mirror() == Rgb::ZERO)?;
         let begin = self.numbers.len();
