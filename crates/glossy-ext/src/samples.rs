@@ -37,6 +37,12 @@ impl IlluminationSample {
         NodeId(self.sender & !ORIENTED)
     }
 
+    /// Whether the receiver is oriented, so that the irradiance is on its plane and includes the cosine.
+    #[must_use]
+    pub fn is_oriented(&self) -> bool {
+        self.sender & ORIENTED != 0
+    }
+
     /// Irradiance at the receiver, W/m²: on its plane if it is oriented, else perpendicular to the direction.
     #[must_use]
     pub fn irradiance(&self) -> Rgb {
@@ -199,7 +205,7 @@ fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Plac
     let cosine = direction.dot(place.normal());
     // A sender with extent may be partly above the horizon though its middle is not; its light is then weak.
     let local = place.local(direction);
-    let oriented = sample.sender & ORIENTED != 0;
+    let oriented = sample.is_oriented();
     let nearness = |at: Vec3| {
         if hierarchy.is_distant(sender) {
             1.0

@@ -10,9 +10,9 @@ pub struct Facing {
     /// Mean normal: of length 1 for flat sets, 0 for closed ones.
     pub mean: Vec3,
     /// Means of nx², ny², nz².
-    diagonal: Vec3,
+    pub diagonal: Vec3,
     /// Means of ny·nz, nz·nx, nx·ny.
-    mixed: Vec3,
+    pub mixed: Vec3,
 }
 
 impl Facing {

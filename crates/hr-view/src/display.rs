@@ -4,6 +4,7 @@
 //! vertex and never computed again; radiance that follows the eye is asked for, vertex by vertex, with
 //! [`Walkable::glossy_radiance`].
 
+use crate::at_pixels::AtPixels;
 use crate::camera_path::CameraPath;
 use crate::inside::Inside;
 use glam::{DVec3, Vec2, Vec3};
@@ -185,6 +186,17 @@ pub trait Walkable: Send + Sync {
     /// camera's up, and z without a camera.
     fn up(&self) -> DVec3 {
         up_of(self.cameras())
+    }
+
+    /// Whether glossy light is to be shown as it is at pixels, where that can be.
+    fn prefers_pixels(&self) -> bool {
+        false
+    }
+
+    /// Glossy light for a device that reflects it at each pixel, in arrays of at most so many bytes; `None` where there is
+    /// none in that form.
+    fn at_pixels(&self, _most: u64) -> Option<AtPixels> {
+        None
     }
 
     /// Radiance (W/(m² sr)) toward an eye (in scene units), beside the diffuse part and emission. `vertices` are

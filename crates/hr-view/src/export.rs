@@ -38,7 +38,7 @@ mod vertex_light;
 
 use crate::ViewError;
 use crate::display::up_of;
-use crate::facets::{Roundness, facets};
+use crate::facets::{Facets, Roundness, facets};
 use crate::solved::Solved;
 use crate::window::Tone;
 use glam::{DMat4, DQuat, DVec3};
@@ -90,7 +90,7 @@ pub fn write(solved: &Solved, path: &Path) -> Result<(), ViewError> {
 
 /// Both scenes.
 fn gltf(solved: &Solved) -> Glb {
-    let (mesh, sources) = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
+    let Facets { mesh, sources, .. } = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
     let tone = Tone::for_mesh(&mesh);
     let mut file = Glb::default();
     let place = place(solved, mesh.origin);

@@ -49,9 +49,23 @@ pub struct Source {
     pub corners: [(u32, f32); 3],
 }
 
-/// Makes the triangles that show a solution, and for each of [`DisplayMesh::glossy`] where its light comes from.
+/// The triangles that show a solution, and what they show.
+#[derive(Debug)]
+pub struct Facets {
+    /// The triangles.
+    pub mesh: DisplayMesh,
+    /// For each of [`DisplayMesh::glossy`] where its light comes from.
+    pub sources: Vec<Source>,
+    /// For each triangle the leaf that it is a part of, or [`NO_LEAF`].
+    pub leaves: Vec<u32>,
+}
+
+/// In place of a leaf, where a triangle is the black back of something.
+pub const NO_LEAF: u32 = u32::MAX;
+
+/// Makes the triangles that show a solution.
 #[must_use]
-pub fn facets(scene: &Scene, solution: &Solution<GlossyField>, roundness: Roundness) -> (DisplayMesh, Vec<Source>) {
+pub fn facets(scene: &Scene, solution: &Solution<GlossyField>, roundness: Roundness) -> Facets {
     let mut maker = Maker::new(scene, solution, roundness);
     for leaf in solution.elements.patch_leaves() {
         maker.leaf(leaf);
@@ -97,6 +111,20 @@ struct Look<'a> {
     varies: bool,
 }
 
+/// Triangles and their leaves.
+#[derive(Clone, Default)]
+struct Triangles {
+    indices: Vec<u32>,
+    leaves: Vec<u32>,
+}
+
+impl Triangles {
+    fn push(&mut self, corners: [u32; 3], leaf: u32) {
+        self.indices.extend(corners);
+        self.leaves.push(leaf);
+    }
+}
+
 struct Maker<'a> {
     scene: &'a Scene,
     solution: &'a Solution<GlossyField>,
@@ -104,7 +132,7 @@ struct Maker<'a> {
     mesh: DisplayMesh,
     sources: Vec<Source>,
     /// Triangles per batch.
-    batches: Vec<Vec<u32>>,
+    batches: Vec<Triangles>,
     /// Of each material: 0, or one more than the index of its texture.
     texture_of: Vec<usize>,
     /// Vertex of each of the solution's vertices on fronts and on backs.
@@ -138,7 +166,7 @@ impl<'a> Maker<'a> {
             scene,
             solution,
             roundness,
-            batches: vec![Vec::new(); textures.len() + 1],
+            batches: vec![Triangles::default(); textures.len() + 1],
             mesh: DisplayMesh { textures, ..mesh },
             sources: Vec::new(),
             texture_of,
@@ -342,13 +370,13 @@ impl<'a> Maker<'a> {
             return;
         }
         let corners = if look.counter_clockwise { [a, b, c] } else { [a, c, b] };
-        self.batches[look.batch].extend(corners);
+        self.batches[look.batch].push(corners, look.leaf);
         // A sliver beside a pole may be folded over, within the tolerance; its black behind would be in front.
         let [p, q, r] = corners.map(|vertex| self.mesh.positions[vertex as usize]);
         let faces = (q - p).cross(r - p).dot(self.mesh.normals[corners[0] as usize]) > 0.0;
         if look.black_behind && faces {
             let [a, b, c] = corners.map(|vertex| self.black_behind(vertex));
-            self.batches[0].extend([a, c, b]);
+            self.batches[0].push([a, c, b], NO_LEAF);
         }
     }
 
@@ -428,7 +456,7 @@ impl<'a> Maker<'a> {
         let forward = !runs_counter_clockwise(geometry);
         for i in 1..corners.len() - 1 {
             let [a, b, c] = [corners[0], corners[i], corners[i + 1]];
-            self.batches[0].extend(if forward { [a, b, c] } else { [a, c, b] });
+            self.batches[0].push(if forward { [a, b, c] } else { [a, c, b] }, NO_LEAF);
         }
     }
 
@@ -447,17 +475,18 @@ impl<'a> Maker<'a> {
         self.mesh.uv.push(Vec2::ZERO);
     }
 
-    fn finish(self) -> (DisplayMesh, Vec<Source>) {
-        let mut mesh = self.mesh;
+    fn finish(self) -> Facets {
+        let (mut mesh, mut leaves) = (self.mesh, Vec::new());
         for (batch, mut triangles) in self.batches.into_iter().enumerate() {
             let start = mesh.indices.len() as u32;
-            mesh.indices.append(&mut triangles);
+            mesh.indices.append(&mut triangles.indices);
+            leaves.append(&mut triangles.leaves);
             let indices = start..mesh.indices.len() as u32;
             if !indices.is_empty() {
                 mesh.batches.push(Batch { indices, texture: batch.checked_sub(1).map(|t| t as u32) });
             }
         }
-        (mesh, self.sources)
+        Facets { mesh, sources: self.sources, leaves }
     }
 }
 

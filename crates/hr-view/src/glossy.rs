@@ -10,13 +10,20 @@ use std::f32::consts::FRAC_1_PI;
 /// Cosine below which a distribution says less and less about what is reflected: it is no longer divided by it.
 const LEAST_COSINE: f32 = 0.05;
 
+/// Lobes narrower than this (standard deviation in radians, about 8°) show more than samples tell: one of a link stands
+/// for too much of what is to be seen in them. Rays follow them where there are rays, as in the paper's final ray caster.
+pub(crate) const FOLLOWED: f32 = 0.14;
+/// Where there are none, senders count as at least so wide (standard deviation in radians, about 1.7°): as in light
+/// transport, and so that a highlight between two vertices does not vanish.
+pub(crate) const NARROWEST: f32 = 0.03;
+
 /// Where glossy light comes from, in images, frames and the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
     /// evaluate the outgoing distributions (the paper's walkthrough, section 5)
     #[default]
     Distributions,
-    /// reflect the incident samples at each pixel, in the window at each vertex (section 3.4)
+    /// reflect the incident samples at each pixel (section 3.4)
     Samples,
     /// final gather: one bounce of rays reads the solution, light of emitters comes by shadow rays; for stills
     Gather,

@@ -29,7 +29,7 @@ mod vertices;
 
 use crate::ViewError;
 use crate::display::{DisplayMesh, up_of};
-use crate::facets::{Roundness, Source, facets};
+use crate::facets::{Facets, Roundness, Source, facets};
 use crate::solved::Solved;
 use crate::window::lists::split;
 use crate::window::tone::BRIGHTEST;
@@ -73,7 +73,7 @@ struct Facts<'a> {
 /// # Errors
 /// [`ViewError::Scene`] with `path` where it cannot be written.
 pub fn write(solved: &Solved, path: &Path) -> Result<(), ViewError> {
-    let (mut mesh, sources) = facets(&solved.scene, &solved.solution, ROUNDNESS);
+    let Facets { mut mesh, sources, .. } = facets(&solved.scene, &solved.solution, ROUNDNESS);
     vertices::gather(&mut mesh);
     Ok(write_whole(path, |out| page(solved, &mesh, &sources, out))?)
 }
@@ -107,7 +107,7 @@ fn page(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut impl 
 fn solution(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut impl Write) -> io::Result<()> {
     let tone = Tone::for_mesh(mesh);
     let Curve { numerator: [a, b], denominator: [c, d, e] } = tone.curve;
-    let lists = split(mesh);
+    let lists = split(mesh, &[]);
     let lattice = Lattice::of(mesh);
     let mut payload = Payload::default();
     let names = ["diffuse", "glossy"];

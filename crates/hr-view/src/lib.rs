@@ -2,6 +2,7 @@
 
 pub mod app;
 pub mod args;
+pub mod at_pixels;
 pub mod camera_path;
 pub mod display;
 mod edits;

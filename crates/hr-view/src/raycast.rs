@@ -4,7 +4,7 @@
 //! vertices, and the glossy part as the [`Mode`] says. A final gather does that only one reflection later: the paths of
 //! a [path tracer](crate::path_tracer) end where they meet the solution, whose elements and mistakes are then seen blurred.
 
-use crate::glossy::{self, Mode};
+use crate::glossy::{self, FOLLOWED, Mode, NARROWEST};
 use crate::path_tracer::{PathTracer, Ray};
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::haar::Haar;
@@ -17,13 +17,8 @@ use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-/// Lobes narrower than this (standard deviation in radians, about 8°) are followed by rays at the pixel, as the
-/// paper's final ray caster would: a link's sample stands for too much of what is to be seen in them.
-const FOLLOWED: f32 = 0.14;
 /// Rays that follow a narrow lobe, per ray of the pixel.
 const LOBE_RAYS: u32 = 6;
-/// Senders seen by way of another reflection count as at least so wide (radians).
-const NARROWEST: f32 = 0.03;
 /// Mirrors in mirrors end here.
 const MOST_BOUNCES: u32 = 4;
 /// Paths of a final gather, for every ray of the other modes. With the grid of stills 63 per pixel, 4032 per 8 × 8 block:

@@ -1,9 +1,10 @@
 //! A solution, ready to be walked through.
 
+use crate::at_pixels::AtPixels;
 use crate::camera_path::CameraPath;
 use crate::display::{DisplayMesh, Walkable};
-use crate::facets::{Roundness, Source, facets};
-use crate::glossy::{self, Mode};
+use crate::facets::{Facets, Roundness, Source, facets};
+use crate::glossy::{self, Mode, NARROWEST};
 use crate::inside::{Anatomy, Inside};
 use crate::solved::Solved;
 use glam::{DVec3, Vec3};
@@ -11,10 +12,6 @@ use glossy_ext::{Incident, Place};
 use hr_diffuse::NodeId;
 use hr_scene::{Camera, Rgb};
 use std::sync::Arc;
-
-/// Reflecting samples at vertices, senders count as at least so wide (standard deviation in radians, about 1.7°): as
-/// in light transport, and so that a highlight between two vertices does not vanish.
-const NARROWEST: f32 = 0.03;
 
 /// The scene's own walk, as it is played: so many cameras in so many seconds.
 const TOUR_CAMERAS: usize = 120;
@@ -28,6 +25,10 @@ pub struct Walkthrough {
     mesh: DisplayMesh,
     /// Per entry of the mesh's `glossy`.
     sources: Vec<Source>,
+    /// Where each of them is, in unit space.
+    places: Vec<Vec3>,
+    /// The leaf of each triangle.
+    triangles: Vec<u32>,
     /// The leaves around each of them with their shares, each leaf once: those of entry i are at `first[i]..first[i + 1]`.
     leaves: Vec<(u32, f32)>,
     first: Vec<u32>,
@@ -35,10 +36,16 @@ pub struct Walkthrough {
 
 impl Walkthrough {
     /// Makes the triangles. With [`Mode::Samples`] glossy light is that of the illumination samples, reflected at each
-    /// vertex; perfect mirrors, which samples cannot show, keep their distributions.
+    /// pixel, or at each vertex where a device or a material has no other way; perfect mirrors, which samples cannot show,
+    /// keep their distributions.
     #[must_use]
     pub fn new(solved: Arc<Solved>, mode: Mode) -> Self {
-        let (mesh, sources) = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
+        let Facets { mesh, sources, leaves: triangles } = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
+        let place = |source: &Source| {
+            let surface = solved.solution.elements.nodes[source.leaf as usize].source;
+            solved.solution.scene.surfaces()[surface as usize].point(source.uv)
+        };
+        let places = sources.iter().map(place).collect();
         let (mut leaves, mut first) = (Vec::new(), vec![0]);
         let mut around = Vec::new();
         for source in &sources {
@@ -54,18 +61,18 @@ impl Walkthrough {
             }
             first.push(leaves.len() as u32);
         }
-        Self { solved, mode, mesh, sources, leaves, first }
+        Self { solved, mode, mesh, sources, places, triangles, leaves, first }
     }
 
     /// Glossy radiance of a vertex toward an eye in unit space.
     fn radiance(&self, eye: Vec3, slot: usize, scratch: &mut Vec<Incident>) -> Rgb {
         let solution = &self.solved.solution;
-        let source = &self.sources[slot];
-        let surface = solution.elements.nodes[source.leaf as usize].source;
-        let at = solution.scene.surfaces()[surface as usize].point(source.uv);
+        let at = self.places[slot];
         let away = (eye - at).normalize_or_zero();
         let normal = self.mesh.normals[self.mesh.glossy[slot] as usize];
         if self.mode == Mode::Samples {
+            let source = &self.sources[slot];
+            let surface = solution.elements.nodes[source.leaf as usize].source;
             let material = &self.solved.scene.materials[solution.scene.surface_materials[surface as usize] as usize];
             if material.reflector.mirror() == Rgb::ZERO {
                 let color = self.solved.scene.base_color(surface, source.uv.x, source.uv.y);
@@ -79,6 +86,23 @@ impl Walkthrough {
         }
         let leaves = &self.leaves[self.first[slot] as usize..self.first[slot + 1] as usize];
         glossy::blended(solution, leaves.iter().copied(), normal, away)
+    }
+}
+
+impl Walkthrough {
+    /// Base colour of each vertex where it varies, without the texture; empty where none does.
+    fn colors(&self) -> Vec<Rgb> {
+        let Solved { scene, solution } = &*self.solved;
+        let mut colors = Vec::new();
+        for (&vertex, source) in self.mesh.glossy.iter().zip(&self.sources) {
+            let element = &solution.elements.nodes[source.leaf as usize];
+            let Some(attributes) = scene.attributes_of(element.source) else { continue };
+            colors.resize(self.mesh.positions.len(), Rgb::ONE);
+            let shape = &scene.surfaces[element.source as usize].shape;
+            let factor = scene.materials[element.material as usize].base_color;
+            colors[vertex as usize] = factor * attributes.color_at(shape, source.uv.x, source.uv.y);
+        }
+        colors
     }
 }
 
@@ -101,6 +125,14 @@ impl Walkable for Walkthrough {
 
     fn inside(&self) -> Option<Box<dyn Inside + '_>> {
         Some(Box::new(Anatomy { solved: &self.solved, origin: self.mesh.origin }))
+    }
+
+    fn prefers_pixels(&self) -> bool {
+        self.mode == Mode::Samples
+    }
+
+    fn at_pixels(&self, most: u64) -> Option<AtPixels> {
+        Some(AtPixels::new(&self.solved, self.mesh.origin, &self.triangles, self.colors(), most))
     }
 
     fn glossy_radiance(&self, eye: DVec3, vertices: &[u32], out: &mut [Rgb]) {

@@ -6,20 +6,24 @@
 mod app;
 mod canvas;
 mod chunks;
+mod frame;
 mod gauge;
 mod gpu;
 mod hud;
 mod input;
+mod layouts;
 pub(crate) mod lists;
 mod live;
 mod looking;
 mod offscreen;
 mod overlay;
+mod parts;
 mod pipelines;
 mod refresh;
 mod scene_buffers;
 mod screen;
 mod shown;
+mod sight;
 mod snapshot;
 mod textures;
 pub(crate) mod tone;
@@ -27,7 +31,7 @@ mod tour;
 mod view;
 mod walker;
 
-pub use offscreen::{FrameCost, Offscreen};
+pub use offscreen::{Begun, FrameCost, Offscreen};
 pub use screen::{Screen, Status, Wish};
 pub use snapshot::Snapshot;
 pub use tone::{Curve, Tone};
@@ -138,8 +142,7 @@ pub fn open(walk: Arc<dyn Walkable>, options: &WindowOptions) -> Result<Walked, 
 /// Like [`open`]; where they are errors of opening the window, `start` has not been called.
 pub fn open_live(options: &WindowOptions, start: impl FnOnce(Screen) + 'static) -> Result<Walked, WindowError> {
     let event_loop = event_loop()?;
-    let screen = Screen::new(event_loop.create_proxy());
-    let mut app = app::App::new(options.clone(), Box::new(start), screen);
+    let mut app = app::App::new(options.clone(), Box::new(start), event_loop.create_proxy());
     let ended = event_loop.run_app(&mut app);
     let walked = app.finish()?;
     ended.map_err(|error| WindowError::NoDisplay(reason(&error)))?;

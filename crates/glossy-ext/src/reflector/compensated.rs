@@ -5,7 +5,7 @@ use super::extent::Disk;
 use super::ggx::{directional_albedo, mean_fresnel};
 use super::half_vector::cosine_range;
 use super::metallic_roughness::DIELECTRIC_F0;
-use super::{HORIZON, Incident, Lobe, MetallicRoughness, Reflector, Sample, above, cosine_hemisphere};
+use super::{Formula, HORIZON, Incident, LOSSES, Lobe, MetallicRoughness, Reflector, Sample, above, cosine_hemisphere};
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -45,7 +45,7 @@ struct Losses {
 }
 
 /// Fresnel's factor changes fastest at grazing directions: 33 squares leave 10⁻³ at most between them.
-const NODES: usize = 33;
+const NODES: usize = LOSSES;
 
 /// Squared, values for each node.
 const CELLS: usize = 24;
@@ -202,6 +202,12 @@ impl Reflector for Compensated {
         let incident = cosine_hemisphere(Vec2::new(u.x / COSINE_SHARE, u.y));
         let rest = self.rest(incident.z, self.losses.at(outgoing.z));
         above(incident).then(|| Sample { incident, weight: rest * (PI / COSINE_SHARE) })
+    }
+
+    fn formulas(&self) -> Option<Vec<Formula>> {
+        let MetallicRoughness { base, metallic, alpha, .. } = self.single;
+        let losses = Box::new(self.losses.table);
+        Some(vec![Formula::Compensated { base, metallic, alpha, losses, mean: self.losses.mean }])
     }
 
     fn with_base_color(&self, color: Rgb) -> Option<Arc<dyn Reflector>> {

@@ -5,7 +5,7 @@ use super::extent::{Disk, Meeting, ggx_over_disk};
 use super::ggx::{density, distribution, draw, mean_albedo, schlick, visibility};
 use super::half_vector::HalfRange;
 use super::ward::slope_to_width;
-use super::{Compensated, Incident, Lobe, Reflector, Sample, above, cosine_hemisphere, mirrored};
+use super::{Compensated, Formula, Incident, Lobe, Reflector, Sample, above, cosine_hemisphere, mirrored};
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
 use std::f32::consts::FRAC_1_PI;
@@ -230,6 +230,11 @@ impl Reflector for MetallicRoughness {
         }
         let density = (1.0 - cosine) * density(self.alpha, incident, outgoing) + cosine * FRAC_1_PI * incident.z;
         (density > 0.0).then(|| Sample { incident, weight: self.glossy(incident, outgoing) * (incident.z / density) })
+    }
+
+    fn formulas(&self) -> Option<Vec<Formula>> {
+        let Self { base, metallic, alpha, .. } = *self;
+        Some(vec![Formula::MetallicRoughness { base, metallic, alpha }])
     }
 
     fn with_base_color(&self, color: Rgb) -> Option<Arc<dyn Reflector>> {

@@ -24,6 +24,7 @@
 mod compensated;
 mod error;
 mod extent;
+mod formula;
 mod generic;
 mod ggx;
 mod half_vector;
@@ -39,6 +40,7 @@ mod ward;
 
 pub use compensated::Compensated;
 pub use error::ReflectorError;
+pub use formula::{Formula, LOSSES};
 pub use lambert::Lambert;
 pub use merl::MerlError;
 pub use metallic_roughness::MetallicRoughness;
@@ -195,6 +197,11 @@ pub trait Reflector: Debug + Send + Sync {
     /// Reflectance of a perfect mirror that is part of this BRDF (a delta lobe), else 0.
     fn mirror(&self) -> Rgb {
         Rgb::ZERO
+    }
+
+    /// The glossy part as a sum of built-in formulas, by their parameters; `None` where it is none. A mirror is no part of it.
+    fn formulas(&self) -> Option<Vec<Formula>> {
+        self.is_diffuse().then(Vec::new)
     }
 
     /// The same material with another base colour, for textures; `None` where it has none. Colours outside 0…1 are

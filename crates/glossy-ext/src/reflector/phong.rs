@@ -3,7 +3,7 @@
 use super::error::{ReflectorError, clamped, number, reflectance};
 use super::extent::{Disk, gaussian_over_disk};
 use super::half_vector::cosine_range;
-use super::{HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
+use super::{Formula, HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, TAU};
@@ -184,6 +184,10 @@ impl Reflector for Phong {
     fn sample(&self, outgoing: Vec3, u: Vec2) -> Option<Sample> {
         let (incident, weight) = draw(self.n, outgoing, u)?;
         Some(Sample { incident, weight: self.ks * weight })
+    }
+
+    fn formulas(&self) -> Option<Vec<Formula>> {
+        Some(vec![Formula::Phong { ks: self.ks, n: self.n }])
     }
 
     /// The base colour is `kd`.

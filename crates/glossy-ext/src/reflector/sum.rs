@@ -1,6 +1,6 @@
 //! Reflectors added up.
 
-use super::{Incident, Lobe, Reflector, Sample, above};
+use super::{Formula, Incident, Lobe, Reflector, Sample, above};
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
 use std::sync::Arc;
@@ -113,6 +113,11 @@ impl Reflector for Sum {
 
     fn mirror(&self) -> Rgb {
         self.add(|part| part.mirror())
+    }
+
+    fn formulas(&self) -> Option<Vec<Formula>> {
+        let parts: Option<Vec<_>> = self.parts.iter().map(|part| part.formulas()).collect();
+        Some(parts?.concat())
     }
 
     /// Recolours the parts that have a base colour and are not purely glossy; none if no part has one.

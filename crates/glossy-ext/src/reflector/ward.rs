@@ -3,7 +3,7 @@
 use super::error::{ReflectorError, clamped, direction, number, reflectance};
 use super::extent::{Disk, Meeting, gaussian_over_disk};
 use super::half_vector::HalfRange;
-use super::{HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
+use super::{Formula, HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, TAU};
@@ -249,6 +249,11 @@ impl Reflector for Ward {
 
     fn mirror(&self) -> Rgb {
         if self.alpha < Self::MIRROR_BELOW { self.rs } else { Rgb::ZERO }
+    }
+
+    fn formulas(&self) -> Option<Vec<Formula>> {
+        let lobe = || Formula::Ward { rs: self.rs, alpha: self.alpha, stretch: self.stretch };
+        Some(self.has_lobe().then(lobe).into_iter().collect())
     }
 
     /// The base colour is `rd`.

@@ -43,7 +43,7 @@ pub(super) fn add(
     };
     let material = file.unlit("light at vertices", None, &json!({}));
     let mut primitives = Vec::new();
-    for (list, glossy) in split(mesh).iter().zip([false, true]) {
+    for (list, glossy) in split(mesh, &[]).iter().zip([false, true]) {
         if list.indices.is_empty() {
             continue;
         }

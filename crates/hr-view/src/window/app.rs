@@ -5,7 +5,7 @@ use super::screen::{News, Screen};
 use super::{Walked, WindowError, WindowOptions};
 use winit::application::ApplicationHandler;
 use winit::event::{DeviceEvent, DeviceId, WindowEvent};
-use winit::event_loop::{ActiveEventLoop, ControlFlow};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::window::WindowId;
 
 /// What to do once the window is open.
@@ -14,15 +14,15 @@ type Start = Box<dyn FnOnce(Screen)>;
 /// Nothing before the window system is ready; then the open window.
 pub(super) struct App {
     options: WindowOptions,
-    start: Option<(Start, Screen)>,
+    start: Option<(Start, EventLoopProxy<News>)>,
     live: Option<Live>,
     failure: Option<WindowError>,
     walked: Walked,
 }
 
 impl App {
-    pub(super) fn new(options: WindowOptions, start: Start, screen: Screen) -> Self {
-        Self { options, start: Some((start, screen)), live: None, failure: None, walked: Walked::default() }
+    pub(super) fn new(options: WindowOptions, start: Start, proxy: EventLoopProxy<News>) -> Self {
+        Self { options, start: Some((start, proxy)), live: None, failure: None, walked: Walked::default() }
     }
 
     /// What was done, or the error that ended the walk.
@@ -46,11 +46,11 @@ impl App {
 
 impl ApplicationHandler<News> for App {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
-        let Some((start, screen)) = self.start.take() else { return };
+        let Some((start, proxy)) = self.start.take() else { return };
         match Live::new(&self.options, event_loop) {
             Ok(live) => {
+                start(live.screen(proxy));
                 self.live = Some(live);
-                start(screen);
             }
             Err(error) => {
                 self.failure.get_or_insert(error);

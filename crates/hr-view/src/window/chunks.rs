@@ -1,7 +1,7 @@
 //! Triangles in chunks that are near each other and face alike, so that what is not seen is left out by the hundred.
 
-use super::lists::{VertexList, split};
-use super::refresh::Sight;
+use super::lists::VertexList;
+use super::sight::Sight;
 use crate::display::{Batch, DisplayMesh};
 use glam::Vec3;
 use std::ops::Range;
@@ -49,9 +49,9 @@ impl Chunk {
         sight.sides.iter().all(|side| side.dot(to_eye) <= self.radius) && self.may_face(to_eye)
     }
 
-    /// From the eye to where it may begin; negative inside.
+    /// From the eye to its middle: of what is large, such as a wall, most is not near though some may be.
     pub(super) fn distance(&self, sight: &Sight) -> f32 {
-        self.center.distance(sight.eye) - self.radius
+        self.center.distance(sight.eye)
     }
 
     fn may_face(&self, to_eye: Vec3) -> bool {
@@ -74,12 +74,13 @@ pub(super) struct Chunked {
 }
 
 impl Chunked {
-    /// Sorts a list's triangles into chunks, and its vertices by first use.
-    pub(super) fn new(mesh: &DisplayMesh, list: &VertexList) -> Self {
+    /// Sorts a list's triangles into chunks, and its vertices by first use. There is more than one part where one would have
+    /// more than so many vertices or indices, and there is none of an empty list.
+    pub(super) fn within(mesh: &DisplayMesh, list: &VertexList, most: u64) -> Vec<Self> {
         let position = |v: u32| mesh.positions[list.vertices[v as usize] as usize];
         let (low, high) = mesh.bounds();
         let scale = 1023.0 / (high - low).max_element().max(f32::MIN_POSITIVE);
-        let mut chunked = Self::default();
+        let (mut parts, mut part) = (Vec::new(), Self::default());
         let mut place = vec![u32::MAX; list.vertices.len()];
         for batch in &list.batches {
             let indices = &list.indices[batch.indices.start as usize..batch.indices.end as usize];
@@ -93,31 +94,49 @@ impl Chunked {
                 })
                 .collect();
             triangles.sort_by_key(|(key, _)| *key);
-            let first = chunked.list.indices.len();
             for chunk in triangles.chunks(MOST_TRIANGLES) {
-                let start = chunked.list.indices.len();
-                for corner in chunk.iter().flat_map(|(_, corners)| *corners) {
-                    let place = &mut place[corner as usize];
-                    if *place == u32::MAX {
-                        *place = chunked.list.vertices.len() as u32;
-                        chunked.list.vertices.push(list.vertices[corner as usize]);
-                    }
-                    chunked.list.indices.push(*place);
+                // There may be as many new vertices.
+                let more = 3 * chunk.len();
+                if part.list.indices.len().max(part.list.vertices.len()) as u64 + more as u64 > most {
+                    parts.extend(std::mem::take(&mut part).unless_empty());
+                    place.fill(u32::MAX);
                 }
-                let points: Vec<[Vec3; 3]> = chunk.iter().map(|(_, corners)| corners.map(position)).collect();
-                let range = start as u32..chunked.list.indices.len() as u32;
-                chunked.chunks.push(Chunk::new(range, batch.texture, &points));
+                part.add(list, batch.texture, chunk, &mut place, &position);
             }
-            let indices = first as u32..chunked.list.indices.len() as u32;
-            chunked.list.batches.push(Batch { indices, texture: batch.texture });
         }
-        chunked
+        parts.extend(part.unless_empty());
+        parts
     }
-}
 
-/// A mesh's diffuse and glossy list in chunks.
-pub(super) fn chunked(mesh: &DisplayMesh) -> [Chunked; 2] {
-    split(mesh).map(|list| Chunked::new(mesh, &list))
+    fn unless_empty(self) -> Option<Self> {
+        (!self.chunks.is_empty()).then_some(self)
+    }
+
+    /// Adds triangles of another list. `place` is where its vertices are in this one.
+    fn add(
+        &mut self,
+        from: &VertexList,
+        texture: Option<u32>,
+        triangles: &[(u64, [u32; 3])],
+        place: &mut [u32],
+        position: &impl Fn(u32) -> Vec3,
+    ) {
+        let list = &mut self.list;
+        let start = list.indices.len() as u32;
+        for corner in triangles.iter().flat_map(|(_, corners)| *corners) {
+            let place = &mut place[corner as usize];
+            if *place == u32::MAX {
+                *place = list.vertices.len() as u32;
+                list.vertices.push(from.vertices[corner as usize]);
+                list.leaves.extend(from.leaves.get(corner as usize));
+            }
+            list.indices.push(*place);
+        }
+        let indices = start..list.indices.len() as u32;
+        let points: Vec<[Vec3; 3]> = triangles.iter().map(|(_, corners)| corners.map(position)).collect();
+        self.chunks.push(Chunk::new(indices.clone(), texture, &points));
+        list.batches.push(Batch { indices, texture });
+    }
 }
 
 /// Unit normal of a triangle; zero where it has no area.
@@ -146,7 +165,8 @@ fn key(normal: Vec3, at: Vec3) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::window::refresh::may_be_seen;
+    use crate::window::lists::split;
+    use crate::window::sight::may_be_seen;
     use crate::window::view::View;
     use glam::DVec3;
     use std::collections::HashSet;
@@ -185,8 +205,8 @@ mod tests {
     #[test]
     fn nothing_is_lost_and_nothing_that_is_seen_is_left_out() {
         let mesh = hills();
-        let [list, _] = split(&mesh);
-        let chunked = Chunked::new(&mesh, &list);
+        let [list, _] = split(&mesh, &[]);
+        let [chunked] = &Chunked::within(&mesh, &list, u64::MAX)[..] else { panic!("one part") };
         let triangles = |list: &VertexList, range: Range<u32>| -> Vec<[u32; 3]> {
             let indices = &list.indices[range.start as usize..range.end as usize];
             indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|v| list.vertices[v as usize])).collect()

@@ -125,11 +125,11 @@ mod tests {
     use super::*;
     use crate::display::{Batch, Walkable};
     use crate::inside::Mark;
-    use crate::window::chunks::chunked;
+    use crate::window::frame::Frame;
     use crate::window::gpu::Gpu;
+    use crate::window::layouts::Layouts;
     use crate::window::overlay::{Layer, Marks};
-    use crate::window::pipelines::Layouts;
-    use crate::window::scene_buffers::Frame;
+    use crate::window::parts::Parts;
     use crate::window::shown::Shown;
     use crate::window::snapshot::Snapshot;
     use crate::window::tone::{Tone, srgb_encode};
@@ -186,7 +186,8 @@ mod tests {
             Err(error) => return eprintln!("skipped, no graphics device: {error}"),
         };
         let layouts = Layouts::new(&gpu);
-        let mut shown = Shown::new(&gpu, &layouts, &square, chunked(square.mesh())).expect("a small mesh");
+        let mut shown =
+            Shown::new(&gpu, &layouts, &square, Parts::new(&square, gpu.capacity(), false)).expect("a small mesh");
         let view = View::looking(DVec3::new(0.0, 0.0, 4.0), DVec3::NEG_Z, DVec3::Y, 60.0, 1.0);
         shown.follow(&gpu, &square, &view, [4, 4], 0.0);
         let tone = Tone::for_mesh(square.mesh());

@@ -15,6 +15,19 @@ pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// The graphics systems to try, in order: OpenGL only where there is nothing else, for its drivers are slow to start.
 const SYSTEMS: [Backends; 2] = [Backends::PRIMARY, Backends::GL];
 
+/// Storage buffers of the shader that reflects samples, and the least size that it is worth it with.
+const STORAGE_BUFFERS: u32 = 4;
+const LEAST_STORAGE: u64 = 1 << 20;
+
+/// How large a device's buffers may be, in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Capacity {
+    /// Any buffer.
+    pub(super) buffer: u64,
+    /// What a pixel's shader reads as a whole; `None` where it reads none.
+    pub(super) storage: Option<u64>,
+}
+
 /// A device with its queue, and the first error that it reported outside of any call.
 pub(super) struct Gpu {
     instance: wgpu::Instance,
@@ -90,6 +103,16 @@ impl Gpu {
         }
     }
 
+    /// How large its buffers may be.
+    pub(super) fn capacity(&self) -> Capacity {
+        let limits = self.device.limits();
+        let buffer = limits.max_buffer_size;
+        let can = self.adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::FRAGMENT_STORAGE)
+            && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS;
+        let storage = can.then(|| limits.max_storage_buffer_binding_size.min(buffer));
+        Capacity { buffer, storage: storage.filter(|&most| most >= LEAST_STORAGE) }
+    }
+
     /// Whether the device is the processor, where every sample of a pixel costs what a pixel costs.
     pub(super) fn is_slow(&self) -> bool {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
@@ -128,6 +151,11 @@ fn instance(systems: Backends, display: Option<&OwnedDisplayHandle>) -> wgpu::In
 /// A surface on the window; it keeps the window alive.
 fn surface(instance: &wgpu::Instance, window: &Arc<Window>) -> Result<wgpu::Surface<'static>, WindowError> {
     instance.create_surface(Arc::clone(window)).map_err(|error| WindowError::NoAdapter(one_line(&error)))
+}
+
+/// A buffer size, if the device can hold it.
+pub(super) fn fitting(size: u64, limit: u64) -> Result<u64, WindowError> {
+    if size <= limit { Ok(size) } else { Err(WindowError::TooLarge { size, limit }) }
 }
 
 /// An error with its causes, in one line.

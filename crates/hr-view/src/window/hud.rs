@@ -23,8 +23,11 @@ pub(super) struct Facts<'a> {
     pub(super) camera: Option<&'a str>,
     pub(super) triangles: usize,
     pub(super) vertices: usize,
+    /// Vertices whose glossy light is computed, and how many of them were.
     pub(super) glossy: usize,
     pub(super) evaluated: usize,
+    /// Whether glossy light is that of pixels, but for those vertices.
+    pub(super) at_pixels: bool,
     /// Time of the glossy evaluation of the last frame.
     pub(super) evaluation: Duration,
     /// Time from frame to frame while something moves; before that, the time of the first frame.
@@ -181,14 +184,21 @@ fn lines(context: &egui::Context, facts: &Facts<'_>, settings: &Settings) {
     let milliseconds = facts.frame.as_secs_f64() * 1e3;
     let rate = if milliseconds > 0.0 { 1e3 / milliseconds } else { 0.0 };
     let camera = facts.camera.map(|name| format!(" · {name}")).unwrap_or_default();
-    let text = format!(
-        "{}{camera}   {milliseconds:.1} ms  {rate:.0} fps   {} triangles   glossy {} of {} vertices in {:.1} ms   \
-         {:+.1} EV   H help\n{}",
-        facts.scene,
-        facts.triangles,
+    let vertices = format!(
+        "glossy {} of {} vertices in {:.1} ms",
         facts.evaluated,
         facts.glossy,
-        facts.evaluation.as_secs_f64() * 1e3,
+        facts.evaluation.as_secs_f64() * 1e3
+    );
+    let glossy = match (facts.at_pixels, facts.glossy) {
+        (false, _) => vertices,
+        (true, 0) => "glossy at pixels".to_owned(),
+        (true, _) => format!("glossy at pixels, {vertices}"),
+    };
+    let text = format!(
+        "{}{camera}   {milliseconds:.1} ms  {rate:.0} fps   {} triangles   {glossy}   {:+.1} EV   H help\n{}",
+        facts.scene,
+        facts.triangles,
         settings.stops,
         solving(facts.status),
     );

@@ -24,7 +24,7 @@ const CAMERA_KEYS: [KeyCode; 10] = [
 ];
 
 /// Keys and what they do, as the help shows them.
-pub(super) const HELP: [(&str, &str); 24] = [
+pub(super) const HELP: [(&str, &str); 25] = [
     ("W A S D, arrows up, down", "walk"),
     ("E Q, space shift", "up, down"),
     ("drag, arrows left, right", "look around"),
@@ -42,6 +42,7 @@ pub(super) const HELP: [(&str, &str); 24] = [
     ("; '", "polish, roughen the surface that was clicked"),
     ("M", "outlines of elements"),
     ("B", "boxes of clusters, level by level"),
+    ("K", "glossy light at each pixel, or at vertices"),
     ("G", "false colours: radiance, radiosity, irradiance"),
     ("+ −", "brighter, darker"),
     ("backspace", "automatic exposure"),
@@ -75,6 +76,8 @@ pub(super) enum Command {
     Elements,
     Clusters,
     Gauge,
+    /// Glossy light at pixels or at vertices.
+    Pixels,
 }
 
 /// The command of a key; `repeat` where it is held down.
@@ -104,6 +107,7 @@ pub(super) fn command(code: KeyCode, key: &Key, repeat: bool) -> Option<Command>
         (KeyCode::KeyM, _) => Command::Elements,
         (KeyCode::KeyB, _) => Command::Clusters,
         (KeyCode::KeyG, _) => Command::Gauge,
+        (KeyCode::KeyK, _) => Command::Pixels,
         (KeyCode::KeyH | KeyCode::F1, _) => Command::Help,
         (KeyCode::KeyT, _) => Command::Lines,
         (KeyCode::KeyF | KeyCode::F12, _) => Command::Screenshot,

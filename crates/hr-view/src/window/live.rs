@@ -1,14 +1,16 @@
 //! The open window: events in, frames out.
 
 use super::canvas::{Canvas, Output};
+use super::frame::Frame;
 use super::gauge::Gauge;
-use super::gpu::Gpu;
+use super::gpu::{Gpu, one_line};
 use super::hud::{Facts, Hud, Settings};
 use super::input::{Command, command};
+use super::layouts::Layouts;
 use super::looking::Looking;
-use super::pipelines::{Layouts, Pass};
-use super::scene_buffers::Frame;
-use super::screen::{News, Prepared, Status, Wish};
+use super::parts::Parts;
+use super::pipelines::Pass;
+use super::screen::{News, Prepared, Screen, Status, Wish};
 use super::shown::Shown;
 use super::snapshot::Snapshot;
 use super::tone::Tone;
@@ -18,11 +20,12 @@ use super::walker::Walker;
 use super::{Blank, Walked, WindowError, WindowOptions, full, reason, unused};
 use crate::display::Walkable;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 use winit::dpi::{LogicalSize, PhysicalPosition};
 use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
-use winit::event_loop::ActiveEventLoop;
+use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::keyboard::PhysicalKey;
 use winit::window::{CursorGrabMode, Window};
 
@@ -38,6 +41,11 @@ const STILL: f64 = 3.0;
 /// While the eye moves, glossy vertices wait until its direction has changed by this (radians, 1°), which nobody sees
 /// then; when it comes to rest, all are made exact.
 const MOVING: f32 = 0.017_453_3;
+
+/// Glossy light is computed at pixels, unless somebody insists, where a frame is thought to take no longer than this. It
+/// is measured with a picture of this size.
+const LONGEST: Duration = Duration::from_millis(250);
+const TRIAL: [u32; 2] = [128, 80];
 
 /// Whether to go on.
 pub(super) enum Next {
@@ -65,6 +73,10 @@ pub(super) struct Live {
     pass: Pass,
     walk: Arc<dyn Walkable>,
     shown: Shown,
+    /// Whether glossy light is wanted the other way round than the solution prefers it, as who prepares solutions knows it.
+    is_turned: Arc<AtomicBool>,
+    /// Whether somebody has chosen himself where it is computed.
+    has_chosen: bool,
     automatic: Tone,
     gauge: Gauge,
     looking: Looking,
@@ -106,8 +118,8 @@ impl Live {
         // Walking smoothly comes before smooth edges.
         let samples = if gpu.is_slow() { 1 } else { gpu.samples(canvas.format()) };
         let pass = Pass::new(&gpu, &layouts, canvas.format(), samples);
-        let Prepared { lists, tone, .. } = Prepared::new(Arc::clone(&walk))?;
-        let shown = Shown::new(&gpu, &layouts, walk.as_ref(), lists)?;
+        let Prepared { parts, tone, .. } = Prepared::new(Arc::clone(&walk), gpu.capacity(), false)?;
+        let shown = Shown::new(&gpu, &layouts, walk.as_ref(), parts)?;
         gpu.fault()?;
         let info = gpu.adapter.get_info();
         let walker = Walker::new(walk.as_ref());
@@ -133,6 +145,8 @@ impl Live {
             walked: Walked::default(),
             walk,
             shown,
+            is_turned: Arc::default(),
+            has_chosen: false,
             window,
             gpu,
             canvas,
@@ -142,6 +156,11 @@ impl Live {
         live.window.set_visible(true);
         live.window.request_redraw();
         Ok(live)
+    }
+
+    /// What solutions are shown on.
+    pub(super) fn screen(&self, proxy: EventLoopProxy<News>) -> Screen {
+        Screen::new(proxy, self.gpu.capacity(), Arc::clone(&self.is_turned))
     }
 
     /// What was done so far.
@@ -174,9 +193,9 @@ impl Live {
     }
 
     fn show(&mut self, prepared: Prepared) -> Result<(), WindowError> {
-        let Prepared { walk, lists, tone, tour } = prepared;
+        let Prepared { walk, parts, wants_pixels, tone, tour } = prepared;
         let is_first = self.walk.mesh().positions.is_empty();
-        match Shown::new(&self.gpu, &self.layouts, walk.as_ref(), lists) {
+        match Shown::new(&self.gpu, &self.layouts, walk.as_ref(), parts) {
             Ok(shown) => self.shown = shown,
             // What there is may still be walked through.
             Err(error @ WindowError::TooLarge { .. }) if !is_first => {
@@ -196,8 +215,88 @@ impl Live {
         }
         self.window.set_title(&title(walk.name(), &self.status));
         self.walk = walk;
+        if wants_pixels && !self.has_chosen && self.shown.left.is_some() {
+            let frame = self.frame_at_pixels()?;
+            if frame > LONGEST {
+                self.set_pixels(false)?;
+                let seconds = frame.as_secs_f64();
+                self.hud
+                    .say(format!("at pixels a frame takes {seconds:.1} s here: glossy light at vertices, K insists"));
+            } else if is_first {
+                self.tell_of_pixels();
+            }
+        } else if wants_pixels && is_first {
+            self.tell_of_pixels();
+        }
         self.gauge.high = self.gauge.quantity.high(self.walk.mesh());
         self.looking.update(&self.gpu, self.walk.as_ref())
+    }
+
+    /// Shows glossy light at pixels instead of vertices, or the other way round.
+    fn turn_pixels(&mut self) -> Result<(), WindowError> {
+        let wants_pixels = self.shown.left.is_none();
+        self.has_chosen = true;
+        self.set_pixels(wants_pixels)?;
+        if wants_pixels {
+            self.tell_of_pixels();
+        } else {
+            self.hud.say("glossy light at vertices".to_owned());
+        }
+        Ok(())
+    }
+
+    fn set_pixels(&mut self, wants_pixels: bool) -> Result<(), WindowError> {
+        let parts = Parts::new(self.walk.as_ref(), self.gpu.capacity(), wants_pixels);
+        self.is_turned.store(wants_pixels != self.walk.prefers_pixels(), Ordering::Relaxed);
+        self.shown = Shown::new(&self.gpu, &self.layouts, self.walk.as_ref(), parts)?;
+        Ok(())
+    }
+
+    /// How long a frame takes with the light that is at pixels, by a small picture of what is seen now.
+    fn frame_at_pixels(&mut self) -> Result<Duration, WindowError> {
+        let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("trial"),
+            size: wgpu::Extent3d { width: TRIAL[0], height: TRIAL[1], depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: self.canvas.format(),
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+            view_formats: &[],
+        });
+        let target = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let (tone, mut took) = (self.tone(), Duration::ZERO);
+        let frame = Frame {
+            view: &self.walker.view,
+            tone: &tone,
+            mesh: self.walk.mesh(),
+            gauge: Gauge::OFF,
+            marks: self.looking.marks(),
+        };
+        // The first one makes the device compile its shaders.
+        for _ in 0..2 {
+            let begin = Instant::now();
+            let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            self.pass.draw(&self.gpu, &self.shown.buffers, &mut encoder, &target, TRIAL, &frame);
+            self.gpu.queue.submit([encoder.finish()]);
+            let waited = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+            waited.map_err(|error| WindowError::Device(one_line(&error)))?;
+            took = begin.elapsed();
+        }
+        let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+        Ok(took.mul_f64((pixels(self.canvas.size()) / pixels(TRIAL)).max(1.0)))
+    }
+
+    /// Says what has become of the wish for glossy light at pixels.
+    fn tell_of_pixels(&mut self) {
+        self.hud.say(match &self.shown.left {
+            None if self.gpu.capacity().storage.is_none() => {
+                "this device cannot compute glossy light at pixels; it stays at vertices".to_owned()
+            }
+            None => "nothing here has glossy light at pixels; it stays at vertices".to_owned(),
+            Some(left) if left.is_empty() => "glossy light at each pixel".to_owned(),
+            Some(left) => format!("glossy light at each pixel, but at vertices on {}", left.join(", ")),
+        });
     }
 
     pub(super) fn window_event(&mut self, event: &WindowEvent) -> Result<Next, WindowError> {
@@ -284,6 +383,7 @@ impl Live {
                 let quantity = self.gauge.quantity.next();
                 self.gauge = Gauge { quantity, high: quantity.high(self.walk.mesh()) };
             }
+            Command::Pixels => self.turn_pixels()?,
             Command::Play => {
                 let said = self.tour.play(Instant::now());
                 self.hud.say(said);
@@ -459,7 +559,8 @@ impl Live {
             camera: self.camera.and_then(|i| self.walk.cameras().get(i)).map(|(name, _)| name.as_str()),
             triangles: mesh.triangle_count(),
             vertices: mesh.positions.len(),
-            glossy: mesh.glossy.len(),
+            glossy: if self.shown.left.is_some() { self.shown.refreshed.visible } else { mesh.glossy.len() },
+            at_pixels: self.shown.left.is_some(),
             evaluated: self.shown.refreshed.evaluated,
             evaluation: self.shown.evaluation,
             frame: self.frame_time,

@@ -1,10 +1,11 @@
 //! Frames without a window, one after the other, and what each costs.
 
-use super::chunks::chunked;
+use super::frame::Frame;
 use super::gauge::Gauge;
 use super::gpu::{Gpu, one_line};
-use super::pipelines::{Layouts, Pass};
-use super::scene_buffers::Frame;
+use super::layouts::Layouts;
+use super::parts::Parts;
+use super::pipelines::Pass;
 use super::shown::Shown;
 use super::tone::Tone;
 use super::view::View;
@@ -52,7 +53,7 @@ impl<'a> Offscreen<'a> {
         // As in the window.
         let samples = if gpu.is_slow() { 1 } else { gpu.samples(snapshot::FORMAT) };
         let pass = Pass::new(&gpu, &layouts, snapshot::FORMAT, samples);
-        let shown = Shown::new(&gpu, &layouts, walk, chunked(mesh))?;
+        let shown = Shown::new(&gpu, &layouts, walk, Parts::new(walk, gpu.capacity(), walk.prefers_pixels()))?;
         gpu.fault()?;
         Ok(Self { walk, pass, shown, tone: Tone::for_mesh(mesh), size, target, gpu })
     }
@@ -76,14 +77,28 @@ impl<'a> Offscreen<'a> {
     /// # Errors
     /// Where the device fails.
     pub fn frame(&mut self, camera: &Camera, tolerance: f32) -> Result<FrameCost, WindowError> {
+        let begun = self.begin(camera, tolerance);
+        self.end(begun)
+    }
+
+    /// The first half of a [`frame`](Self::frame): all that is done outside of the rasteriser, which rests meanwhile.
+    #[must_use]
+    pub fn begin(&mut self, camera: &Camera, tolerance: f32) -> Begun {
         let begin = Instant::now();
         let view = View::of_camera(camera);
         self.shown.follow(&self.gpu, self.walk, &view, self.size, tolerance);
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let frame = Frame { view: &view, tone: &self.tone, mesh: self.walk.mesh(), gauge: Gauge::OFF, marks: &[] };
         self.pass.draw(&self.gpu, &self.shown.buffers, &mut encoder, &self.target, self.size, &frame);
-        let commands = encoder.finish();
-        let outside = begin.elapsed();
+        Begun { commands: encoder.finish(), begin, outside: begin.elapsed() }
+    }
+
+    /// The second half: until the device has drawn it.
+    ///
+    /// # Errors
+    /// Where the device fails.
+    pub fn end(&mut self, begun: Begun) -> Result<FrameCost, WindowError> {
+        let Begun { commands, begin, outside } = begun;
         self.gpu.queue.submit([commands]);
         let waited = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
         waited.map_err(|error| WindowError::Device(one_line(&error)))?;
@@ -91,4 +106,11 @@ impl<'a> Offscreen<'a> {
         let refreshed = self.shown.refreshed;
         Ok(FrameCost { whole: begin.elapsed(), outside, visible: refreshed.visible, evaluated: refreshed.evaluated })
     }
+}
+
+/// A frame that the device has yet to draw.
+pub struct Begun {
+    commands: wgpu::CommandBuffer,
+    begin: Instant,
+    outside: Duration,
 }

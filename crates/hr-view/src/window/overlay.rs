@@ -1,9 +1,8 @@
 //! What is drawn over the picture: lines and surfaces of one colour each.
 
 use super::WindowError;
-use super::gpu::{DEPTH, Gpu};
-use super::pipelines::Layouts;
-use super::scene_buffers::fitting;
+use super::gpu::{DEPTH, Gpu, fitting};
+use super::layouts::Layouts;
 use crate::inside::Mark;
 use bytemuck::{Pod, Zeroable};
 use wgpu::util::DeviceExt;

@@ -1,49 +1,23 @@
-//! How a scene is drawn: shader, layouts, pipelines, and intermediate targets.
+//! How a scene is drawn: pipelines, and intermediate targets.
 
+use super::frame::Frame;
+use super::gauge::Quantity;
 use super::gpu::{DEPTH, Gpu};
+use super::layouts::Layouts;
 use super::overlay::Overlay;
-use super::scene_buffers::{Frame, GLOSSY_ATTRIBUTES, SceneBuffers, VERTEX_ATTRIBUTES, Vertex};
+use super::scene_buffers::{GLOSSY_ATTRIBUTES, ORIENTED_ATTRIBUTES, Oriented, SceneBuffers, VERTEX_ATTRIBUTES, Vertex};
 use glossy_ext::Rgb;
-
-/// What all scenes and output formats share.
-pub(super) struct Layouts {
-    pub(super) frame: wgpu::BindGroupLayout,
-    pub(super) material: wgpu::BindGroupLayout,
-    /// Without and with a texture.
-    scene: [wgpu::PipelineLayout; 2],
-    shader: wgpu::ShaderModule,
-}
-
-impl Layouts {
-    pub(super) fn new(gpu: &Gpu) -> Self {
-        let device = &gpu.device;
-        let frame = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("frame"),
-            entries: &[uniform_entry(0, wgpu::ShaderStages::VERTEX_FRAGMENT)],
-        });
-        let material = material_layout(device);
-        let layout = |groups: &[Option<&wgpu::BindGroupLayout>]| {
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("scene"),
-                bind_group_layouts: groups,
-                immediate_size: 0,
-            })
-        };
-        let scene = [layout(&[Some(&frame)]), layout(&[Some(&frame), Some(&material)])];
-        Self { frame, material, scene, shader: device.create_shader_module(wgpu::include_wgsl!("scene.wgsl")) }
-    }
-}
 
 /// Pipelines and intermediate targets for one output format.
 pub(super) struct Pass {
+    layouts: Layouts,
     format: wgpu::TextureFormat,
     samples: u32,
-    /// Without and with a texture.
-    diffuse: [wgpu::RenderPipeline; 2],
-    glossy: [wgpu::RenderPipeline; 2],
+    /// Those of the last frame.
+    pipelines: Option<Pipelines>,
     overlay: Overlay,
-    /// Chunks to be drawn, by their distance; kept for its memory.
-    order: Vec<(f32, usize)>,
+    /// Distances of the chunks to be drawn, and which they are of which list; kept for its memory.
+    order: Vec<(f32, usize, usize)>,
     targets: Option<Targets>,
 }
 
@@ -55,19 +29,40 @@ struct Targets {
     color: Option<wgpu::TextureView>,
 }
 
-impl Pass {
-    pub(super) fn new(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat, samples: u32) -> Self {
-        let pipeline = |entry: &str,
+/// For each list, without and with a texture.
+struct Pipelines {
+    /// What of shaders is fixed: false colours, and kinds of lobes.
+    fixed: (bool, u32),
+    diffuse: [wgpu::RenderPipeline; 2],
+    glossy: [wgpu::RenderPipeline; 2],
+    /// For light at pixels, where the device can.
+    sampled: Option<[wgpu::RenderPipeline; 2]>,
+}
+
+impl Pipelines {
+    fn new(
+        gpu: &Gpu,
+        layouts: &Layouts,
+        format: wgpu::TextureFormat,
+        samples: u32,
+        (false_colors, kinds): (bool, u32),
+    ) -> Self {
+        // Software devices compute both sides of a condition, whatever it is.
+        let constants = [("FALSE_COLORS", if false_colors { 1.0 } else { 0.0 }), ("KINDS", f64::from(kinds))];
+        let pipeline = |shader: &wgpu::ShaderModule,
+                        constants: &[(&str, f64)],
+                        entry: &str,
                         fragment: &str,
                         layout: &wgpu::PipelineLayout,
                         buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
+            let options = wgpu::PipelineCompilationOptions { constants, ..Default::default() };
             gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(entry),
                 layout: Some(layout),
                 vertex: wgpu::VertexState {
-                    module: &layouts.shader,
+                    module: shader,
                     entry_point: Some(entry),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    compilation_options: options.clone(),
                     buffers,
                 },
                 primitive: wgpu::PrimitiveState {
@@ -83,34 +78,63 @@ impl Pass {
                 }),
                 multisample: wgpu::MultisampleState { count: samples, ..wgpu::MultisampleState::default() },
                 fragment: Some(wgpu::FragmentState {
-                    module: &layouts.shader,
+                    module: shader,
                     entry_point: Some(fragment),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    compilation_options: options.clone(),
                     targets: &[Some(format.into())],
                 }),
                 multiview_mask: None,
                 cache: None,
             })
         };
-        let fixed = Some(wgpu::VertexBufferLayout {
+        let whole = Some(wgpu::VertexBufferLayout {
             array_stride: size_of::<Vertex>() as u64,
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &VERTEX_ATTRIBUTES,
         });
-        let following = Some(wgpu::VertexBufferLayout {
-            array_stride: size_of::<Rgb>() as u64,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &GLOSSY_ATTRIBUTES,
-        });
-        let both = |list: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
-            [("plain", &layouts.scene[0]), ("textured", &layouts.scene[1])]
-                .map(|(kind, layout)| pipeline(&format!("{list}_{kind}"), &format!("{kind}_fragment"), layout, buffers))
+        let beside = |stride: usize, attributes| {
+            Some(wgpu::VertexBufferLayout {
+                array_stride: stride as u64,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes,
+            })
         };
+        let following = beside(size_of::<Rgb>(), &GLOSSY_ATTRIBUTES);
+        let oriented = beside(size_of::<Oriented>(), &ORIENTED_ATTRIBUTES);
+        let both = |list: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
+            [("plain", &layouts.scene[0]), ("textured", &layouts.scene[1])].map(|(kind, layout)| {
+                pipeline(
+                    &layouts.shader,
+                    &constants[..1],
+                    &format!("{list}_{kind}"),
+                    &format!("{kind}_fragment"),
+                    layout,
+                    buffers,
+                )
+            })
+        };
+        let sampled = layouts.sampled.as_ref().map(|sampled| {
+            [("plain", &sampled.scene[0]), ("textured", &sampled.scene[1])].map(|(kind, layout)| {
+                let fragment = format!("sampled_{kind}_fragment");
+                pipeline(&sampled.shader, &constants, "sampled", &fragment, layout, &[whole.clone(), oriented.clone()])
+            })
+        });
         Self {
+            fixed: (false_colors, kinds),
+            diffuse: both("diffuse", std::slice::from_ref(&whole)),
+            glossy: both("glossy", &[whole.clone(), following]),
+            sampled,
+        }
+    }
+}
+
+impl Pass {
+    pub(super) fn new(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat, samples: u32) -> Self {
+        Self {
+            layouts: layouts.clone(),
             format,
             samples,
-            diffuse: both("diffuse", std::slice::from_ref(&fixed)),
-            glossy: both("glossy", &[fixed.clone(), following]),
+            pipelines: None,
             overlay: Overlay::new(gpu, layouts, format, samples),
             order: Vec::new(),
             targets: None,
@@ -158,33 +182,39 @@ impl Pass {
         });
         let sight = frame.view.sight(frame.mesh.origin, f64::from(size[0]) / f64::from(size[1]));
         pass.set_bind_group(0, &scene.frame_group, &[]);
-        for (list, pipelines, follows) in [(&scene.diffuse, &self.diffuse, false), (&scene.glossy, &self.glossy, true)]
-        {
-            if list.chunks.is_empty() {
-                continue;
-            }
-            pass.set_vertex_buffer(0, list.vertices.slice(..));
-            if follows {
-                pass.set_vertex_buffer(1, scene.glossy_radiance.slice(..));
-            }
-            pass.set_index_buffer(list.indices.slice(..), wgpu::IndexFormat::Uint32);
-            // The nearest first, so that what is hidden is not shaded.
-            self.order.clear();
+        let fixed = (frame.gauge.quantity != Quantity::Picture, scene.kinds);
+        let pipelines = match self.pipelines.take().filter(|pipelines| pipelines.fixed == fixed) {
+            Some(pipelines) => pipelines,
+            None => Pipelines::new(gpu, &self.layouts, self.format, self.samples, fixed),
+        };
+        let pipelines = &*self.pipelines.insert(pipelines);
+        let diffuse = scene.diffuse.iter().map(|list| (list, &pipelines.diffuse));
+        let glossy = scene.glossy.iter().map(|list| (list, &pipelines.glossy));
+        let sampled = scene.sampled.iter().filter_map(|list| Some((list, pipelines.sampled.as_ref()?)));
+        let lists: Vec<_> = diffuse.chain(glossy).chain(sampled).collect();
+        // The nearest first, so that what is hidden is not shaded.
+        self.order.clear();
+        for (at, (list, _)) in lists.iter().enumerate() {
             let seen = list.chunks.iter().enumerate().filter(|(_, chunk)| chunk.may_be_seen(&sight));
-            self.order.extend(seen.map(|(i, chunk)| (chunk.distance(&sight), i)));
-            self.order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-            let mut last = None;
-            for &(_, i) in &self.order {
-                let chunk = &list.chunks[i];
-                if last != Some(chunk.texture) {
-                    last = Some(chunk.texture);
-                    pass.set_pipeline(&pipelines[usize::from(chunk.texture.is_some())]);
-                    if let Some(texture) = chunk.texture {
-                        pass.set_bind_group(1, &scene.materials[texture as usize], &[]);
-                    }
-                }
-                pass.draw_indexed(chunk.indices.clone(), 0, 0..1);
+            self.order.extend(seen.map(|(i, chunk)| (chunk.distance(&sight), at, i)));
+        }
+        self.order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut last_list, mut last_texture) = (None, None);
+        for &(_, at, i) in &self.order {
+            let (list, pipelines) = lists[at];
+            let chunk = &list.chunks[i];
+            if last_list != Some(at) {
+                (last_list, last_texture) = (Some(at), None);
+                list.bind(&mut pass);
             }
+            if last_texture != Some(chunk.texture) {
+                last_texture = Some(chunk.texture);
+                pass.set_pipeline(&pipelines[usize::from(chunk.texture.is_some())]);
+                if let Some(texture) = chunk.texture {
+                    pass.set_bind_group(1, &scene.materials[texture as usize], &[]);
+                }
+            }
+            pass.draw_indexed(chunk.indices.clone(), 0, 0..1);
         }
         self.overlay.draw(&mut pass, frame.marks);
     }
@@ -203,37 +233,4 @@ fn target(gpu: &Gpu, [width, height]: [u32; 2], sample_count: u32, format: wgpu:
         view_formats: &[],
     });
     texture.create_view(&wgpu::TextureViewDescriptor::default())
-}
-
-fn uniform_entry(binding: u32, visibility: wgpu::ShaderStages) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility,
-        ty: wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        count: None,
-    }
-}
-
-fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry =
-        |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None };
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("material"),
-        entries: &[
-            entry(
-                0,
-                wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                },
-            ),
-            entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
-            uniform_entry(2, wgpu::ShaderStages::FRAGMENT),
-        ],
-    })
 }

@@ -4,25 +4,17 @@
 //! by more than a tolerance since the last time (paper, section 5).
 
 use super::chunks::Chunked;
-use super::lists::VertexList;
+use super::sight::{Sight, may_be_seen};
 use super::tone::finite;
 use crate::display::Walkable;
 use glam::{DVec3, Vec3};
 use glossy_ext::Rgb;
 use rayon::prelude::*;
+use std::ops::AddAssign;
 
 /// Vertices per call of [`Walkable::glossy_radiance`]: enough to make the call's own cost vanish, few enough to keep
 /// all threads busy.
 const CHUNK: usize = 256;
-
-/// The part of space that a picture shows.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sight {
-    /// The eye, relative to the mesh's origin.
-    pub(super) eye: Vec3,
-    /// Normals of the four side planes through the eye; the picture is where all are ≥ 0.
-    pub(super) sides: [Vec3; 4],
-}
 
 /// What a refresh did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,8 +25,16 @@ pub(super) struct Refreshed {
     pub(super) evaluated: usize,
 }
 
-/// The glossy list's radiances and the directions that they are valid for.
+impl AddAssign for Refreshed {
+    fn add_assign(&mut self, other: Self) {
+        self.visible += other.visible;
+        self.evaluated += other.evaluated;
+    }
+}
+
+/// The radiances of a glossy list and the directions that they are valid for.
 pub(super) struct Refresh {
+    chunked: Chunked,
     /// Per list vertex: its position in `DisplayMesh::glossy`; `None` for those that came along with a triangle.
     slots: Vec<Option<u32>>,
     /// Per list vertex: position relative to the mesh's origin.
@@ -56,12 +56,13 @@ pub(super) struct Refresh {
 
 impl Refresh {
     /// Nothing evaluated yet.
-    pub(super) fn new(walk: &dyn Walkable, list: &VertexList) -> Self {
+    pub(super) fn new(walk: &dyn Walkable, chunked: Chunked) -> Self {
         let mesh = walk.mesh();
         let mut slot_of = vec![None; mesh.positions.len()];
         for (slot, &vertex) in (0_u32..).zip(&mesh.glossy) {
             slot_of[vertex as usize] = Some(slot);
         }
+        let list = &chunked.list;
         let count = list.vertices.len();
         Self {
             slots: list.vertices.iter().map(|&v| slot_of[v as usize]).collect(),
@@ -73,6 +74,7 @@ impl Refresh {
             stale: Vec::new(),
             slots_of_stale: Vec::new(),
             fresh: Vec::new(),
+            chunked,
         }
     }
 
@@ -82,22 +84,15 @@ impl Refresh {
     }
 
     /// Evaluates what the new eye made stale. `tolerance` in radians; 0 evaluates at any change of direction.
-    pub(super) fn update(
-        &mut self,
-        walk: &dyn Walkable,
-        chunked: &Chunked,
-        eye: DVec3,
-        sight: &Sight,
-        tolerance: f32,
-    ) -> Refreshed {
+    pub(super) fn update(&mut self, walk: &dyn Walkable, eye: DVec3, sight: &Sight, tolerance: f32) -> Refreshed {
         self.now = self.now.wrapping_add(1);
         // Two unit vectors at an angle t are 2 sin(t/2) apart: exact for small angles, where a cosine is all rounding.
         let apart = 2.0 * (0.5 * tolerance.clamp(0.0, std::f32::consts::PI)).sin();
         let mut done = Refreshed::default();
         self.stale.clear();
         self.slots_of_stale.clear();
-        for chunk in chunked.chunks.iter().filter(|chunk| chunk.may_be_seen(sight)) {
-            let indices = &chunked.list.indices[chunk.indices.start as usize..chunk.indices.end as usize];
+        for chunk in self.chunked.chunks.iter().filter(|chunk| chunk.may_be_seen(sight)) {
+            let indices = &self.chunked.list.indices[chunk.indices.start as usize..chunk.indices.end as usize];
             for corners in indices.chunks_exact(3) {
                 let corners = [corners[0], corners[1], corners[2]].map(|c| c as usize);
                 if corners.iter().all(|&c| self.needed_in[c] == self.now || self.slots[c].is_none())
@@ -133,18 +128,11 @@ impl Refresh {
     }
 }
 
-/// Whether a triangle faces the eye and is not wholly on the far side of one of the picture's edges.
-pub(super) fn may_be_seen([a, b, c]: [Vec3; 3], sight: &Sight) -> bool {
-    let normal = (b - a).cross(c - a);
-    normal.dot(sight.eye - a) > 0.0
-        && sight.sides.iter().all(|side| [a, b, c].iter().any(|p| side.dot(p - sight.eye) >= 0.0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::display::{Batch, DisplayMesh};
-    use crate::window::chunks::chunked;
+    use crate::window::lists::split;
     use crate::window::view::View;
     use glam::Vec2;
     use hr_scene::Camera;
@@ -191,17 +179,21 @@ mod tests {
         }
     }
 
+    /// All of a mesh's glossy list.
+    fn glossy(mesh: &DisplayMesh) -> Chunked {
+        let [_, list] = split(mesh, &[]);
+        Chunked::within(mesh, &list, u64::MAX).remove(0)
+    }
+
     fn update(refresh: &mut Refresh, square: &Square, eye: DVec3, target: DVec3, tolerance: f32) -> Refreshed {
-        let [_, list] = chunked(square.mesh());
         let view = View::looking(eye, target - eye, DVec3::Y, 90.0, 1.0);
-        refresh.update(square, &list, eye, &view.sight(DVec3::ZERO, 1.0), tolerance)
+        refresh.update(square, eye, &view.sight(DVec3::ZERO, 1.0), tolerance)
     }
 
     #[test]
     fn only_what_changed_is_evaluated() {
         let square = Square::new();
-        let [_, list] = chunked(square.mesh());
-        let mut refresh = Refresh::new(&square, &list.list);
+        let mut refresh = Refresh::new(&square, glossy(square.mesh()));
         let eye = DVec3::new(0.0, 0.0, 4.0);
         let all = Refreshed { visible: 4, evaluated: 4 };
         assert_eq!(update(&mut refresh, &square, eye, DVec3::ZERO, 0.0), all, "first sight");
@@ -220,8 +212,7 @@ mod tests {
     #[test]
     fn what_is_not_seen_waits() {
         let square = Square::new();
-        let [_, list] = chunked(square.mesh());
-        let mut refresh = Refresh::new(&square, &list.list);
+        let mut refresh = Refresh::new(&square, glossy(square.mesh()));
         let above = DVec3::new(0.0, 0.0, 4.0);
         let away = update(&mut refresh, &square, above, DVec3::new(0.0, 0.0, 9.0), 0.0);
         assert_eq!(away, Refreshed::default(), "it is behind the eye");

@@ -3,6 +3,9 @@
 const RAMP = 7u; // colours of the false-colour ramp, as in gauge.rs
 const PI = 3.14159265;
 
+// Whether false colours take the place of the picture.
+override FALSE_COLORS = false;
+
 struct Frame {
     eye: vec4f,         // relative to the mesh's origin
     right: vec4f,       // unit; w: horizontal scale, cotangent of half the field of view
@@ -21,8 +24,8 @@ struct Placement {
     v: vec4f,
 }
 
-// Between the vertices of a triangle without a texture only the sum is interpolated: where the processor draws, every
-// number that is costs as much as the tone mapping.
+// Between the vertices of a triangle without a texture only the sum is interpolated, exposed: where the processor draws,
+// every number and step more costs, and of small triangles several times.
 struct Plain {
     @builtin(position) position: vec4f,
     @location(0) value: vec3f,
@@ -76,7 +79,7 @@ fn light(v: Vertex, glossy: vec3f) -> Light {
 
 fn plain(v: Vertex, glossy: vec3f) -> Plain {
     let l = light(v, glossy);
-    return Plain(project(v.point), l.diffuse + l.other);
+    return Plain(project(v.point), exposed(l.diffuse + l.other));
 }
 
 fn textured(v: Vertex, glossy: vec3f) -> Textured {
@@ -131,23 +134,38 @@ fn encoded(linear: vec3f) -> vec4f {
     return vec4f(select(linear, srgb_encode(linear), frame.denominator.w > 0.5), 1.0);
 }
 
-fn shown(value: vec3f) -> vec4f {
-    if frame.luminance.w > 0.5 {
+// What of tone mapping is linear: the same before interpolation and after it.
+fn exposed(value: vec3f) -> vec3f {
+    if FALSE_COLORS {
+        return value;
+    }
+    return frame.to_srgb * clamp(value * frame.numerator.z, vec3f(0.0), vec3f(frame.numerator.w));
+}
+
+// The rest of it.
+fn developed(value: vec3f) -> vec4f {
+    if FALSE_COLORS {
         return encoded(graded(value));
     }
-    let exposed = clamp(value * frame.numerator.z, vec3f(0.0), vec3f(frame.numerator.w));
-    return encoded(curve(max(frame.to_srgb * exposed, vec3f(0.0))));
+    return encoded(curve(max(value, vec3f(0.0))));
+}
+
+fn shown(value: vec3f) -> vec4f {
+    return developed(exposed(value));
 }
 
 @fragment
 fn plain_fragment(in: Plain) -> @location(0) vec4f {
-    return shown(in.value);
+    return developed(in.value);
+}
+
+fn texel_at(uv: vec2f) -> vec3f {
+    let place = vec3f(uv, 1.0);
+    return textureSample(texels, texel_sampler, vec2f(dot(placement.u.xyz, place), dot(placement.v.xyz, place))).rgb;
 }
 
 @fragment
 fn textured_fragment(in: Textured) -> @location(0) vec4f {
-    let place = vec3f(in.uv, 1.0);
-    let texel = textureSample(texels, texel_sampler, vec2f(dot(placement.u.xyz, place), dot(placement.v.xyz, place)));
     // Irradiance is that of what is under the texture.
-    return shown(in.diffuse * select(texel.rgb, vec3f(1.0), frame.luminance.w > 2.5) + in.other);
+    return shown(in.diffuse * select(texel_at(in.uv), vec3f(1.0), frame.luminance.w > 2.5) + in.other);
 }

@@ -1,10 +1,12 @@
 //! Between those who solve and the window: pictures and news come in, wishes go out.
 
-use super::chunks::{Chunked, chunked};
+use super::gpu::Capacity;
+use super::parts::Parts;
 use super::tone::Tone;
 use crate::camera_path::CameraPath;
 use crate::display::{MeshError, Walkable};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use winit::event_loop::EventLoopProxy;
 
 /// What the one at the window wants of the solution.
@@ -53,17 +55,20 @@ pub struct Status {
 /// A solution, ready for the device.
 pub(super) struct Prepared {
     pub(super) walk: Arc<dyn Walkable>,
-    pub(super) lists: [Chunked; 2],
+    pub(super) parts: Parts,
+    /// Whether its glossy light was wanted at pixels.
+    pub(super) wants_pixels: bool,
     pub(super) tone: Tone,
     pub(super) tour: CameraPath,
 }
 
 impl Prepared {
     /// Everything that can be done without the device.
-    pub(super) fn new(walk: Arc<dyn Walkable>) -> Result<Self, MeshError> {
+    pub(super) fn new(walk: Arc<dyn Walkable>, capacity: Capacity, wants_pixels: bool) -> Result<Self, MeshError> {
         let mesh = walk.mesh();
         mesh.check()?;
-        Ok(Self { lists: chunked(mesh), tone: Tone::for_mesh(mesh), tour: walk.tour(), walk })
+        let parts = Parts::new(walk.as_ref(), capacity, wants_pixels);
+        Ok(Self { parts, wants_pixels, tone: Tone::for_mesh(mesh), tour: walk.tour(), walk })
     }
 }
 
@@ -79,11 +84,14 @@ pub(super) enum News {
 #[derive(Clone, Debug)]
 pub struct Screen {
     proxy: EventLoopProxy<News>,
+    capacity: Capacity,
+    /// Whether glossy light is wanted the other way round than the solution prefers it.
+    is_turned: Arc<AtomicBool>,
 }
 
 impl Screen {
-    pub(super) fn new(proxy: EventLoopProxy<News>) -> Self {
-        Self { proxy }
+    pub(super) fn new(proxy: EventLoopProxy<News>, capacity: Capacity, is_turned: Arc<AtomicBool>) -> Self {
+        Self { proxy, capacity, is_turned }
     }
 
     /// Shows a solution instead of the one before. The eye stays where it is. What can be computed without the device is
@@ -92,7 +100,8 @@ impl Screen {
     /// # Errors
     /// Where the mesh is broken; the window then goes on with what it had.
     pub fn show(&self, walk: Arc<dyn Walkable>) -> Result<(), MeshError> {
-        let prepared = Prepared::new(walk)?;
+        let wants_pixels = walk.prefers_pixels() != self.is_turned.load(Ordering::Relaxed);
+        let prepared = Prepared::new(walk, self.capacity, wants_pixels)?;
         self.send(News::Show(Box::new(prepared)));
         Ok(())
     }

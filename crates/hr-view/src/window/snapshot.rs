@@ -1,11 +1,13 @@
 //! Pictures without a screen: screenshots, and frames drawn by the device without a window.
 
 use super::WindowError;
-use super::chunks::chunked;
+use super::frame::Frame;
 use super::gauge::Gauge;
 use super::gpu::{Gpu, one_line};
-use super::pipelines::{Layouts, Pass};
-use super::scene_buffers::{Frame, SceneBuffers};
+use super::layouts::Layouts;
+use super::parts::Parts;
+use super::pipelines::Pass;
+use super::scene_buffers::SceneBuffers;
 use super::shown::Shown;
 use super::tone::Tone;
 use super::view::View;
@@ -61,7 +63,7 @@ impl Snapshot {
         let layouts = Layouts::new(&gpu);
         let size = [camera.width.max(1), camera.height.max(1)];
         let view = View::of_camera(camera);
-        let mut shown = Shown::new(&gpu, &layouts, walk, chunked(mesh))?;
+        let mut shown = Shown::new(&gpu, &layouts, walk, Parts::new(walk, gpu.capacity(), walk.prefers_pixels()))?;
         shown.follow(&gpu, walk, &view, size, 0.0);
         let automatic = Tone::for_mesh(mesh);
         let frame = Frame { view: &view, tone: tone.unwrap_or(&automatic), mesh, gauge: Gauge::OFF, marks: &[] };
@@ -155,7 +157,8 @@ mod tests {
             }
         };
         let (layouts, nothing) = (Layouts::new(&gpu), Blank::new("nothing"));
-        let mut shown = Shown::new(&gpu, &layouts, &nothing, chunked(nothing.mesh())).expect("nothing is not too much");
+        let mut shown = Shown::new(&gpu, &layouts, &nothing, Parts::new(&nothing, gpu.capacity(), false))
+            .expect("nothing is not too much");
         let view = View::looking(glam::DVec3::ZERO, glam::DVec3::X, glam::DVec3::Z, 60.0, 1.0);
         prepare(&gpu);
         shown.follow(&gpu, &nothing, &view, size, 0.0);

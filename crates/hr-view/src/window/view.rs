@@ -1,6 +1,6 @@
 //! Where the eye is and what it sees.
 
-use super::refresh::Sight;
+use super::sight::Sight;
 use glam::DVec3;
 use hr_scene::Camera;
 use hr_scene::camera::MAX_SIDE;
