@@ -309,6 +309,7 @@ impl Stats {
             leaves,
             links,
             rays,
+            check_rays,
             vertex_rays,
             pairs,
             iterations,
@@ -344,6 +345,7 @@ impl Stats {
             leaves,
             links,
             rays,
+            check_rays,
             vertex_rays,
             pairs,
             iterations.into(),
@@ -369,7 +371,7 @@ impl Stats {
 
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
-        let [polygons, nodes, leaves, links, rays, vertex_rays, pairs, iterations, links_evaluated, bytes] =
+        let [polygons, nodes, leaves, links, rays, check_rays, vertex_rays, pairs, iterations, links_evaluated, bytes] =
             from.take_exactly(WHAT)?;
         let [stopped, spent] = from.take_exactly::<u64, 2>(WHAT)?;
         let [
@@ -389,6 +391,7 @@ impl Stats {
             leaves,
             links,
             rays,
+            check_rays,
             vertex_rays,
             pairs,
             links_evaluated,

@@ -15,7 +15,7 @@ use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
 use crate::visibility::Proof;
 use glam::Vec3;
-use smallvec::{SmallVec, smallvec};
+use smallvec::SmallVec;
 use std::ops::ControlFlow;
 
 /// No more weights than these are kept: 256 MB. In larger scenes the leaves beyond have weights by orientation and distance
@@ -28,6 +28,8 @@ const FAINT_SHARE: f32 = 0.003;
 const OWN_SHARE: f32 = 0.02;
 /// Leaves and senders whose radii together are below this share of their distance are far from each other.
 const FAR: f32 = 0.25;
+/// Links that bring a leaf more than this share of its light from near by are looked at from several points of it.
+const MUCH: f32 = 0.01;
 /// Leaves get no more than this times what a link brings on average. Surfaces that lie in one another's plane hide each
 /// other by turns, which no mean visibility can tell.
 const MOST_WEIGHT: f32 = 8.0;
@@ -238,7 +240,12 @@ fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -
 /// A leaf, and the points that stand for it.
 struct Place {
     leaf: u32,
+    /// Its middle, with its normal and the weight 1, …
+    middle: (Vec3, Vec3, f32),
+    /// … and points, normals and weights (sum 1) that stand for all of it.
     points: SmallVec<[(Vec3, Vec3, f32); 4]>,
+    /// What is brought by links that such points are worth (sum of channels).
+    much: f32,
     /// Senders that bring less than this are not resolved into parts (largest channel), …
     negligible: f32,
     /// … and links that bring less are not looked at closely (sum of channels).
@@ -247,10 +254,16 @@ struct Place {
 
 impl Place {
     fn new<L: LightField>(light: Light<'_, L>, leaf: u32, error: f32) -> Self {
-        let points = sample_points(light.scene, light.element(leaf));
+        let element = light.element(leaf);
         let irradiance = light.exitant.irradiance[leaf as usize];
-        let negligible = NEGLIGIBLE * irradiance.max_element();
-        Self { leaf, points, negligible, faint: FAINT_SHARE * error.sqrt() * irradiance.element_sum() }
+        Self {
+            leaf,
+            middle: (element.center, element.normals.axis, 1.0),
+            points: sample_points(light.scene, element),
+            much: MUCH * irradiance.element_sum(),
+            negligible: NEGLIGIBLE * irradiance.max_element(),
+            faint: FAINT_SHARE * error.sqrt() * irradiance.element_sum(),
+        }
     }
 
     /// What a link brings to the leaf over what it brings to its receiver, by orientation and distance alone.
@@ -291,7 +304,8 @@ impl Place {
             let at = |&(x, n, weight): &(Vec3, Vec3, f32)| {
                 weight * light.arriving_at(x, n, link.sender, self.negligible).0.element_sum()
             };
-            self.points.iter().map(at).sum::<f32>()
+            let varies = !element.is_flat() || !far && mean * visible > self.much;
+            if varies { self.points.iter().map(at).sum::<f32>() } else { at(&self.middle) }
         } else {
             let direction = light.direction_to(element.center, link.sender);
             let (irradiance, _) = light.arriving_at(element.center, direction, link.sender, self.negligible);
@@ -337,11 +351,8 @@ fn renewed<L: LightField>(light: Light<'_, L>, sender: u32, at: Vec3, node: u32)
     (direction, (before / now.max(1e-12)).clamp(0.25, 4.0))
 }
 
-/// Points, normals and weights (sum 1) that stand for a leaf: its middle where it is flat, four of a curved one.
+/// Points, normals and weights (sum 1) that stand for a leaf.
 fn sample_points(scene: &SceneData, element: &Element) -> SmallVec<[(Vec3, Vec3, f32); 4]> {
-    if element.is_flat() {
-        return smallvec![(element.center, element.normals.axis, 1.0)];
-    }
     let geometry = &scene.surfaces()[element.source as usize];
     let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
     let points = geometry.quadrature(element.domain);

@@ -27,6 +27,8 @@ use std::time::Instant;
 /// Share of the oracle's interval that counts as error where it stems from geometry: the transported value is an
 /// average over the interval, and display renews the geometry per vertex.
 const GEOMETRY_SHARE: f32 = 0.12;
+/// The same for receivers that reflect directional light, which shows where light comes from.
+const GLOSSY_GEOMETRY_SHARE: f32 = 0.25;
 /// The same where it stems from the sender's uneven radiosity.
 const RADIOSITY_SHARE: f32 = 0.5;
 /// The same where it stems from the sender's directional distribution: of the directions that lead to a receiver few
@@ -315,7 +317,7 @@ fn most_factor(receiver: &Element, sender: &Element) -> f32 {
 struct Interval {
     /// Largest possible irradiance (max channel).
     most: f32,
-    /// Uncertainty from geometry.
+    /// The share of the uncertainty from geometry that counts.
     geometry: f32,
     /// Uncertainty from the sender's uneven radiosity.
     radiosity: f32,
@@ -325,12 +327,13 @@ struct Interval {
 
 impl Interval {
     fn error(&self) -> f32 {
-        GEOMETRY_SHARE * self.geometry + RADIOSITY_SHARE * self.radiosity + DIRECTIONAL_SHARE * self.directional
+        self.geometry + RADIOSITY_SHARE * self.radiosity + DIRECTIONAL_SHARE * self.directional
     }
 }
 
 /// The interval of a pair. Directional light below `negligible` is not looked at closely.
-fn interval<L: LightField>(light: Light<'_, L>, sender: u32, bounds: &FactorBounds, negligible: f32) -> Interval {
+fn interval<L: LightField>(light: Light<'_, L>, pair: Pair, bounds: &FactorBounds, negligible: f32) -> Interval {
+    let sender = pair.sender;
     let [least, most] = light.diffuse_range(sender);
     let (factor, spread) = (0.5 * (bounds.max + bounds.min), (most - least).max_element());
     let peak = light.directional_most(sender);
@@ -340,9 +343,10 @@ fn interval<L: LightField>(light: Light<'_, L>, sender: u32, bounds: &FactorBoun
         (least, most + peak)
     };
     let typical = (0.5 * (least + most)).max(light.emitted(sender, bounds.from_sender.axis)).max_element();
+    let share = if light.element(pair.receiver).active { GLOSSY_GEOMETRY_SHARE } else { GEOMETRY_SHARE };
     Interval {
         most: high.max_element() * bounds.max,
-        geometry: typical * (bounds.max - bounds.min),
+        geometry: share * typical * (bounds.max - bounds.min),
         radiosity: spread * factor,
         directional: ((high - low).max_element() - spread).max(0.0) * factor,
     }
@@ -376,7 +380,7 @@ fn decide<L: LightField>(
         return Verdict::Facing;
     };
     let weight = r.importance * (r.area / tolerance.area).sqrt();
-    let interval = interval(light, pair.sender, &bounds, tolerance.error / weight);
+    let interval = interval(light, pair, &bounds, tolerance.error / weight);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
     let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);
@@ -399,7 +403,7 @@ fn decide<L: LightField>(
         return Verdict::SplitReceiver;
     }
     if by_bounds > tolerance.error {
-        let prefer_sender = RADIOSITY_SHARE * interval.radiosity > GEOMETRY_SHARE * interval.geometry;
+        let prefer_sender = RADIOSITY_SHARE * interval.radiosity > interval.geometry;
         if let Some(verdict) = split(choose(light, pair, tolerance, prefer_sender)) {
             return verdict;
         }

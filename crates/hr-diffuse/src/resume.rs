@@ -14,11 +14,11 @@ use std::collections::HashSet;
 
 /// Tolerances of the links of the first passes, over the error asked for: nothing is refined for light that is not there yet. The
 /// last of them is the first that leaves look closely in.
-const FIRST: [f32; 3] = [16.0, 8.0, 4.0];
+const FIRST: [f32; 4] = [12.0, 6.0, 3.0, 1.5];
 /// At least this step is between them.
-const HALF: f32 = 0.5;
+const STEP: f32 = 0.6;
 /// A solution is fine enough if its error was found to be below this share of what was asked for: what was found is uncertain.
-const ACCEPTED: f32 = 0.8;
+const ACCEPTED: f32 = 0.9;
 /// The next pass aims at this share, …
 const AIM: f32 = 0.6;
 /// … as if the error shrank with the square root of the tolerance, which is halved at least once and so many times at most, …
@@ -57,7 +57,7 @@ impl Unfinished {
         // Whole halves, so that what rays happen to find seldom makes another solution.
         let halves = (2.0 * (self.found / (AIM * error)).log2()).round().clamp(1.0, MOST_HALVES);
         let halves = if self.found.is_finite() { halves } else { 1.0 };
-        (!done).then(|| (self.tolerance * HALF.powf(halves)).max(FINEST * error))
+        (!done).then(|| (self.tolerance * (-halves).exp2()).max(FINEST * error))
     }
 
     /// Looks at pairs with a coarse link as if they had none.
@@ -75,18 +75,18 @@ impl Unfinished {
 }
 
 /// Tolerances of the first passes toward an error.
-fn first_tolerances(error: f32) -> [f32; 3] {
+fn first_tolerances(error: f32) -> [f32; FIRST.len()] {
     let mut most = 1.0;
     FIRST.map(|share| {
         let tolerance = (share * error).min(most);
-        most = tolerance * HALF;
+        most = tolerance * STEP;
         tolerance
     })
 }
 
 /// Whether leaves look closely in a pass of this tolerance: not before most of the light is there.
 pub(crate) fn is_close(tolerance: f32, error: f32) -> bool {
-    tolerance <= first_tolerances(error)[2]
+    tolerance <= first_tolerances(error)[FIRST.len() - 1]
 }
 
 impl<L: LightField> Solver<L> {

@@ -370,7 +370,7 @@ impl<L: LightField> Solver<L> {
         if let Some(residual) = residual {
             self.stats.error = Some(residual.error());
             self.stats.bias = -residual.bias();
-            self.stats.rays += residual.rays;
+            self.stats.check_rays += residual.rays;
         }
         self.stats.seconds.check += start.elapsed().as_secs_f64();
     }
@@ -670,10 +670,10 @@ struct Pass {
 }
 
 impl Pass {
-    /// Share of all the work that is done when so much of the pass is: most solves take four, and each costs a few times the one
+    /// Share of all the work that is done when so much of the pass is: most solves take four or five, and each costs a few times the one
     /// before.
     fn fraction(&self, within: f32) -> f32 {
-        const SHARES: [f32; 7] = [0.0, 0.05, 0.1, 0.4, 0.8, 0.87, 0.9];
+        const SHARES: [f32; 8] = [0.0, 0.05, 0.1, 0.2, 0.6, 0.8, 0.87, 0.9];
         let pass = self.number.min(SHARES.len() - 2);
         SHARES[pass] + (SHARES[pass + 1] - SHARES[pass]) * within.clamp(0.0, 1.0)
     }

@@ -71,7 +71,7 @@ fn light_gets_below_what_hovers() {
 #[test]
 fn no_light_is_lost_below_a_box() {
     let walls = |cut: bool| {
-        let solution = solve(&room(0.0, cut), 0.03);
+        let solution = solve(&room(0.0, cut), 0.01);
         let light = |surface: usize| {
             let [front, back] = solution.elements.surface_nodes[surface];
             solution.exitant.irradiance[front.min(back) as usize].x

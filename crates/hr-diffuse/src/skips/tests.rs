@@ -127,7 +127,7 @@ fn pairs_that_hardly_face_each_other_change_little() {
 /// edges where surfaces meet, and pairs of which no drawn points face each other.
 #[test]
 fn proofs_change_next_to_nothing() {
-    const ERROR: f32 = 0.1;
+    const ERROR: f32 = 0.05;
     let with = solve(&room(), ERROR, (), Skips::ALL);
     let without = solve(&room(), ERROR, (), Skips { proofs: false, ..Skips::ALL });
     let skipped = with.stats.skipped;
@@ -136,7 +136,7 @@ fn proofs_change_next_to_nothing() {
     assert_eq!((none.proved_free, none.proved_blocked), (0, 0), "none is proved");
     assert!(3 * with.stats.rays < 2 * without.stats.rays, "{} of {} rays", with.stats.rays, without.stats.rays);
     let apart = difference(&radiosities(&with), &radiosities(&without), with.exitant.radiosity[0]);
-    assert!(apart < 0.02 * ERROR, "{apart} of the mean radiosity");
+    assert!(apart < 0.04 * ERROR, "{apart} of the mean radiosity");
 }
 
 /// Links that bring next to nothing need no look from every leaf.
