@@ -70,6 +70,9 @@ pub(crate) struct Gather {
     push: Push,
     /// By leaf, as in `push`: what makes the sum of its form factors what it should be, by group.
     rows: Vec<[f32; GROUPS]>,
+    /// By link: the area that it lights, times what lets its light through, all leaves together. Where an extension takes part, else
+    /// nothing.
+    lit: Vec<f32>,
     /// Irradiance by link.
     arriving: Vec<Rgb>,
     /// Irradiance through evenly spread links, by node and group: its own and those of all above it.
@@ -100,7 +103,30 @@ impl Gather {
         let shares: Vec<[f32; GROUPS - 1]> =
             (0..push.leaves.len()).into_par_iter().with_min_len(64).map(shares).collect();
         let rows = balance(light, &push.leaves, &shares, error.is_some());
-        Self { groups, push, rows, arriving: Vec::new(), even: Vec::new() }
+        let mut gather = Self { groups, push, rows, lit: Vec::new(), arriving: Vec::new(), even: Vec::new() };
+        if light.element(0).active {
+            gather.lit = gather.lit_areas(light, links);
+        }
+        gather
+    }
+
+    /// What links deliver: [`lit`](Self::lit).
+    fn lit_areas<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<f32> {
+        let mut lit = vec![0.0; links.all().len()];
+        for (index, &leaf) in self.push.leaves.iter().enumerate() {
+            let area = light.element(leaf).area;
+            let row = self.rows[index];
+            self.push.each_weight(light, links, index, |at, weight| {
+                let let_through = visible(&links.all()[at], self.push.spreads[at]);
+                lit[at] += area * weight * let_through * row[self.groups[at] as usize];
+            });
+        }
+        lit
+    }
+
+    /// By link: the area that it lights, times what lets its light through; nothing where no extension takes part.
+    pub(crate) fn lit(&self) -> &[f32] {
+        &self.lit
     }
 
     /// Links that leaves do not look at closely, though they are for more than one leaf.

@@ -176,6 +176,35 @@ impl Push {
         }
     }
 
+    /// Calls `visit` with every link above the leaf at an index of `leaves`, and the leaf's weight for it.
+    pub(crate) fn each_weight<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        links: &Links,
+        index: usize,
+        mut visit: impl FnMut(usize, f32),
+    ) {
+        let leaf = self.leaves[index];
+        let place = Place::new(light, leaf, self.error);
+        let kept = self.first.get(index..index + 2).map(|range| &self.weights[range[0]..range[1]]);
+        let mut weights = kept.unwrap_or_default().iter();
+        let mut node = leaf;
+        loop {
+            for at in links.range(node) {
+                let weight = match (self.spreads[at], kept) {
+                    (Spread::Even, _) => 1.0,
+                    (_, Some(_)) => weights.next().copied().unwrap_or_default(),
+                    (spread, None) => place.plain(light, &links.all()[at], spread),
+                };
+                visit(at, weight);
+            }
+            if node == 0 {
+                return;
+            }
+            node = light.element(node).parent;
+        }
+    }
+
     /// The sum of what arrives at the leaf at an index of `leaves`, by group: through evenly spread links, summed up by
     /// node in `even`, and through the others, by link in `arriving`.
     pub(crate) fn sum<L: LightField, T: Copy + std::ops::AddAssign + std::ops::Mul<f32, Output = T>>(

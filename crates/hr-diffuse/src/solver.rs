@@ -617,12 +617,17 @@ impl<L: LightField> Solver<L> {
         if area > 0.0 { (lit / area) as f32 } else { (power / f64::from(self.area)) as f32 }
     }
 
-    /// Whether each of the last iterations after the first ones changed more than the last but one before it: light that does
-    /// not die out. Between two surfaces it goes forth and back, and every other iteration may change less.
+    /// Whether each of the last iterations since the first of a series changed more than the one before or the one before that:
+    /// light that does not die out.
     fn grows(&self, iteration: u32) -> bool {
         const LAST: usize = 5;
         let last = &self.stats.residuals[self.stats.residuals.len().saturating_sub(LAST)..];
         iteration as usize >= LAST && last.windows(3).all(|three| three[2] > three[0])
+    }
+
+    /// By link: the area that it lights, times what lets its light through.
+    pub(crate) fn lit(&self) -> &[f32] {
+        self.gather.lit()
     }
 
     /// What all iterations to come would change.

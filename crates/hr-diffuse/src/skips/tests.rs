@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::ops::ControlFlow;
 
-pub(crate) const GREY: u32 = 0;
+const GREY: u32 = 0;
 const LAMP: u32 = 1;
 const BLACK: u32 = 2;
 /// Reflects on its front alone.
@@ -178,9 +178,9 @@ fn iterations_that_are_left_out_would_change_nothing() {
 }
 
 /// Diffuse reflection of one material by an extension: radiance is the same in all directions.
-pub(crate) struct Echo {
-    pub(crate) material: u32,
-    pub(crate) albedo: f32,
+struct Echo {
+    material: u32,
+    albedo: f32,
 }
 
 impl LightField for Echo {
