@@ -169,8 +169,9 @@ fn random_scenes_are_refused_or_solved() {
     assert!(solved > cases() / 2, "most can be solved: {solved}");
 }
 
-/// No more light than there can be: in no scene whose materials reflect at most half does anything send more than twice
-/// what the brightest emitter does. Lights without extent have poles, and are left out.
+/// No more light than there can be: in no scene whose materials reflect at most half does anything send more than what the
+/// brightest emitter does over what is not reflected, if leaves see up to a tenth more than all there is. Lights without extent
+/// have poles, and are left out.
 #[test]
 fn random_scenes_do_not_make_light() {
     for case in 0..cases() {
@@ -190,7 +191,7 @@ fn random_scenes_do_not_make_light() {
         let solution = solver.finish(&mut watch);
         let brightest = input.materials.iter().map(|m| m.exitance).fold(Rgb::ZERO, Rgb::max);
         for radiosity in &solution.exitant.radiosity {
-            let most = brightest * 2.0 * 1.01;
+            let most = brightest / (1.0 - 0.5 * 1.1) * 1.01;
             assert!(radiosity.cmple(most).all(), "case {case}: {radiosity} of {brightest}, {input:?}");
         }
     }

@@ -224,7 +224,7 @@ mod tests {
     fn args(scene: &str, out: &Path) -> CurveArgs {
         CurveArgs {
             scenes: vec![scene.into()],
-            errors: vec![0.8, 0.4, 0.2],
+            errors: vec![0.2, 0.1, 0.04],
             reference: Vec::new(),
             threads: 1,
             repeat: 1,

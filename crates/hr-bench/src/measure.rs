@@ -121,7 +121,7 @@ mod tests {
         assert_eq!(cost.links, solution.links.all().len() as u64, "links");
         assert_eq!(cost.leaves, solution.elements.patch_leaves().count() as u64, "leaves");
         assert!(cost.bytes > 16 * cost.links && !cost.stopped, "{cost:?}");
-        assert!((0.5..0.55).contains(&cost.believed), "what was asked for, and what is still on its way: {cost:?}");
+        assert!((0.001..0.5).contains(&cost.believed), "less than what was asked for: {cost:?}");
         let at_once = Extent { limit: Some(Duration::ZERO), vertices: false };
         let (_, stopped) = solve(&input, 0.01, 1, at_once).expect("sound");
         assert!(stopped.stopped && stopped.leaves > 0, "{stopped:?}");

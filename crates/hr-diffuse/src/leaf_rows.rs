@@ -17,7 +17,7 @@ const MOST_RAISE: f32 = 3.0;
 
 /// No leaf sees more than all there is, but its few rays may say so: a sum is cut off above this. Cut off at 1, what errs to
 /// the other side would be left alone, and light be lost; so it is the mean over a side of a surface that is kept below 1.
-const MOST_SEEN: f32 = 1.2;
+const MOST_SEEN: f32 = 1.1;
 
 /// Sums of form factors times visibility of a leaf, by which its light is balanced.
 #[derive(Clone, Copy, Debug)]

@@ -84,9 +84,11 @@ fn first_tolerances(error: f32) -> [f32; FIRST.len()] {
     })
 }
 
-/// Whether leaves look closely in a pass of this tolerance: not before most of the light is there.
-pub(crate) fn is_close(tolerance: f32, error: f32) -> bool {
-    tolerance <= first_tolerances(error)[FIRST.len() - 1]
+/// Whether an extension reflects light in a pass of this tolerance, and whether leaves look closely: not before most of the light is
+/// there. What is reflected must be known before the first close look, or it would find no links.
+pub(crate) fn is_worth(tolerance: f32, error: f32) -> (bool, bool) {
+    let [.., before, last] = first_tolerances(error);
+    (tolerance <= before, tolerance <= last)
 }
 
 impl<L: LightField> Solver<L> {

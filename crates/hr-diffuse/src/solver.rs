@@ -14,7 +14,7 @@ use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
 use crate::relight::Linked;
 use crate::residual::{RAYS_PER_LEAF, residual};
-use crate::resume::{Unfinished, is_close};
+use crate::resume::{Unfinished, is_worth};
 use crate::shooting::Shot;
 use crate::skips::Skips;
 use crate::stats::Stats;
@@ -250,14 +250,15 @@ impl<L: LightField> Solver<L> {
         self.unfinished.renew(&mut self.links, self.elements.nodes.len());
         let mut number = 0;
         while let Some(tolerance) = self.unfinished.next(self.settings.error) {
-            let pass = Pass { number, tolerance, closely: is_close(tolerance, self.settings.error) };
+            let (reflects, closely) = is_worth(tolerance, self.settings.error);
+            let pass = Pass { number, tolerance, reflects, closely };
             self.refine(pass, &mut stopped, watch);
             if stopped {
                 // New elements have their parents' light.
                 break;
             }
             // Once a budget is spent there is no later pass to look closely in.
-            let last = Pass { closely: true, tolerance: self.settings.error, ..pass };
+            let last = Pass { reflects: true, closely: true, tolerance: self.settings.error, ..pass };
             let pass = if self.stats.spent.is_some() { last } else { pass };
             self.prepare_watched(pass, &mut stopped, watch);
             self.settle(pass, &mut stopped, watch);
@@ -300,7 +301,8 @@ impl<L: LightField> Solver<L> {
     /// Lets light settle anew over the links that there are, for which it is found out how they reach leaves where it is not
     /// known yet.
     pub(crate) fn settle_again(&mut self, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
-        let pass = Pass { number: 1, tolerance: self.unfinished.tolerance.min(1.0), closely: true };
+        let tolerance = self.unfinished.tolerance.min(1.0);
+        let pass = Pass { number: 1, tolerance, reflects: true, closely: true };
         if !self.prepared {
             self.prepare_watched(pass, stopped, watch);
         }
@@ -312,7 +314,7 @@ impl<L: LightField> Solver<L> {
         // The extension's light is reflected when most of it is there: that is what takes time. Shooting starts from the dark anyhow.
         let warms = self.settings.transport == Transport::Gather && self.elements.nodes[0].active;
         if !pass.closely || warms {
-            self.iterate_until(pass, (FEW_ITERATIONS, 1.0, false), stopped, watch);
+            self.iterate_until(pass, (FEW_ITERATIONS, 1.0, pass.reflects && !pass.closely), stopped, watch);
         }
         if pass.closely && !*stopped {
             self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, true), stopped, watch);
@@ -670,6 +672,8 @@ struct Pass {
     number: usize,
     /// Relative error that its links may have, if it all comes to the worst.
     tolerance: f32,
+    /// Whether the extension's light is reflected.
+    reflects: bool,
     /// Whether leaves look for themselves what arrives from where, and light settles.
     closely: bool,
 }

@@ -146,6 +146,7 @@ impl Solved {
             if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let solved = solve(watch)?;
-        Ok((solved, Accuracy { asked: settings.error, believed: error }))
+        let believed = solved.solution.stats.error.unwrap_or(error);
+        Ok((solved, Accuracy { asked: settings.error, believed }))
     }
 }

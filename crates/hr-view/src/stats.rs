@@ -21,7 +21,7 @@ pub struct Times {
 
 /// The statistics of a solution as JSON. Phases do not overlap: `refine` is without the rays, which are `visibility`,
 /// and values at vertices are part of `display`. `error` is the relative error that the solution is believed to have,
-/// `asked` that which was asked for.
+/// `asked` that which was asked for, `bias` the light that is missing (negative) or too much.
 #[must_use]
 pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
     let solution = &solved.solution;
@@ -33,12 +33,13 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
         "scene": solved.scene.name,
         "error": accuracy.believed,
         "error_asked": accuracy.asked,
+        "bias": stats.bias,
         "seconds": {
             "load": times.load,
             "build": seconds.build,
             "refine": seconds.refine - visibility,
             "visibility": visibility,
-            "transport": seconds.transport,
+            "transport": seconds.transport + seconds.check,
             "reflect": seconds.reflect,
             "display": seconds.reconstruct + times.show,
             "total": times.total,
@@ -49,7 +50,8 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "leaves": stats.leaves,
             "links": stats.links,
             "links_evaluated": stats.links_evaluated,
-            "rays": stats.rays + stats.vertex_rays,
+            "rays": stats.rays + stats.check_rays + stats.vertex_rays,
+            "check_rays": stats.check_rays,
             "vertex_rays": stats.vertex_rays,
             "pairs": stats.pairs,
             "vertices": solution.vertices.positions.len(),
