@@ -1,6 +1,6 @@
 //! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
 
-use crate::budget::{Account, Budget};
+use crate::budget::{Account, Budget, Spent};
 use crate::columns::{FREELY, STRICTLY};
 use crate::convergence::Convergence;
 use crate::error::SolveError;
@@ -248,7 +248,7 @@ impl<L: LightField> Solver<L> {
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
         self.unfinished.renew(&mut self.links, self.elements.nodes.len());
-        let mut number = 0;
+        let (mut number, mut goes_on) = (0, None);
         while let Some(tolerance) = self.unfinished.next(self.settings.error) {
             let (reflects, closely) = is_worth(tolerance, self.settings.error);
             let pass = Pass { number, tolerance, reflects, closely };
@@ -257,21 +257,29 @@ impl<L: LightField> Solver<L> {
                 // New elements have their parents' light.
                 break;
             }
-            // Once a budget is spent there is no later pass to look closely in.
+            let late = self.stats.spent == Some(Spent::Time);
+            // Once time is spent there is no later pass to look closely in.
             let last = Pass { reflects: true, closely: true, tolerance: self.settings.error, ..pass };
-            let pass = if self.stats.spent.is_some() { last } else { pass };
+            let pass = if late { last } else { pass };
             self.prepare_watched(pass, &mut stopped, watch);
             self.settle(pass, &mut stopped, watch);
             if pass.closely && !stopped {
                 self.check(pass, &mut stopped, watch);
             }
             self.measure();
-            if stopped || self.stats.spent.is_some() {
+            if self.stats.spent.is_some() {
+                // What is left to be done begins here; passes that refine nothing still link what light comes to.
+                goes_on.get_or_insert((self.unfinished.tolerance, self.unfinished.found));
+            }
+            if stopped || late || self.stats.spent.is_some() && pass.closely {
                 break;
             }
             self.unfinished.tolerance = tolerance;
             self.unfinished.found = self.stats.error.unwrap_or(f32::INFINITY);
             number += 1;
+        }
+        if let Some(before) = goes_on {
+            (self.unfinished.tolerance, self.unfinished.found) = before;
         }
         if self.stats.iterations == 0 {
             // Whenever it was stopped, there is some light.
