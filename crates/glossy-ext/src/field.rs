@@ -14,6 +14,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// In light transport lobes are at least as wide as this makes them (standard deviation in radians, about 1.7°):
 /// what distributions of level 6 resolve. Narrower ones are followed by rays at display.
 const NARROWEST: f32 = 0.03;
+/// Triangles that are no wider than this share of the finest detail are not divided: at their corners and in their middles
+/// a disk of that radius is met several times.
+const FINEST: f32 = 0.85;
 /// A lobe this many times wider than a sender hardly shows the sender's extent: its variance grows by 1/32.
 const WIDE: f32 = 4.0;
 /// Slope of the lobe that stands for a perfect mirror in light transport.
@@ -164,14 +167,13 @@ impl<B: Basis> GlossyField<B> {
         }
         balance(&mut incident, arrived.irradiance);
         let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
-        // A lobe that is not round is narrower one way; a mirror shows everything.
-        if material.mirror.is_none() && material.reflector.grain().is_none() {
-            merge_close(&mut incident, width);
-        }
-        merge_weak(&mut incident);
-        // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
         // Normals that turn by an angle turn what is reflected by twice as much.
         let narrowest = (2.0 * arrived.spread).clamp(NARROWEST, FRAC_PI_2);
+        // A lobe that is not round is narrower one way; a mirror shows everything.
+        let is_wide = material.mirror.is_none() && material.reflector.grain().is_none();
+        merge_close(&mut incident, if is_wide { width.max(narrowest) } else { narrowest });
+        merge_weak(&mut incident);
+        // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
         for sample in &mut incident {
             sample.extent = sample.extent.max(if width < WIDE * narrowest { narrowest } else { 0.0 });
             if sample.extent * WIDE < width {
@@ -180,7 +182,7 @@ impl<B: Basis> GlossyField<B> {
         }
         // A glossy part may be negative where the diffuse one overestimates; both together are not.
         let (flat, least) = (hierarchy.is_flat(leaf), -arrived.diffuse);
-        Some(Reflection { material, place, incident, flat, least })
+        Some(Reflection { material, place, incident, narrowest, flat, least })
     }
 
     /// Represents what a leaf reflects in the basis.
@@ -189,7 +191,8 @@ impl<B: Basis> GlossyField<B> {
         let known = Known {
             support: Some(reflection.support()),
             offset: -reflection.least,
-            peaks: &peaks(reflection.material, &reflection.incident, &reflection.place),
+            peaks: &peaks(reflection),
+            finest: FINEST * reflection.narrowest,
         };
         let mut overruled = 0;
         let projected = B::project(&self.settings, &known, |direction| {
@@ -223,7 +226,8 @@ impl Material {
 }
 
 /// The strongest of the lobes that the samples make, in world directions.
-fn peaks(material: &Material, incident: &[Incident], place: &Place) -> Vec<Peak> {
+fn peaks(reflection: &Reflection<'_>) -> Vec<Peak> {
+    let Reflection { material, place, incident, narrowest, .. } = reflection;
     let mut strongest: Vec<&Incident> = incident.iter().filter(|i| i.direction.z > 0.05).collect();
     let strength = |i: &Incident| i.irradiance.max_element() / (i.extent * i.extent + 1e-4);
     strongest.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
@@ -239,7 +243,7 @@ fn peaks(material: &Material, incident: &[Incident], place: &Place) -> Vec<Peak>
             } else {
                 (lobe.direction.try_normalize().unwrap_or(mirrored), lobe.width)
             };
-            Peak { direction: place.frame * direction, width: width.max(NARROWEST).max(sample.extent) }
+            Peak { direction: place.frame * direction, width: width.max(*narrowest).max(sample.extent) }
         })
         .collect()
 }
@@ -261,6 +265,8 @@ pub struct Reflection<'a> {
     material: &'a Material,
     place: Place,
     incident: Vec<Incident>,
+    /// Detail finer than this (radians) is lost.
+    narrowest: f32,
     /// Whether it is radiance rather than intensity per area.
     flat: bool,
     /// No less than what cancels the diffuse part.

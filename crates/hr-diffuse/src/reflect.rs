@@ -83,14 +83,14 @@ impl Senders {
     }
 
     /// All leaves that stand for something, in order, each with the angle within which the normals are for which it
-    /// stands: the least where it stands for several nodes.
+    /// stands, its own among them: the least where it stands for several nodes.
     fn leaves(&self, elements: &Elements) -> Vec<Standing> {
         let mut leaves: Vec<Standing> = Vec::with_capacity(self.standing.len());
         for (node, element) in elements.nodes.iter().enumerate() {
             let standing = self.of(node as u32);
-            // As if they divided the cone of normals among them.
-            let spread = element.normals.angle() / (standing.len() as f32).sqrt();
-            let spread = if element.child_count == 0 || spread.is_nan() { 0.0 } else { spread };
+            // As if they divided the cone of normals among them. Most normals of a single leaf are nearer to its own.
+            let share = if element.child_count == 0 { 0.5 } else { (standing.len() as f32).sqrt().recip() };
+            let spread = (element.normals.angle() * share).max(0.0);
             leaves.extend(standing.iter().map(|&(leaf, _)| Standing { leaf, spread }));
         }
         leaves.sort_unstable_by(|a, b| a.leaf.cmp(&b.leaf).then(a.spread.total_cmp(&b.spread)));

@@ -50,11 +50,13 @@ pub struct Known<'a> {
     pub offset: Rgb,
     /// Where lobes point, lest they be missed between the samples.
     pub peaks: &'a [Peak],
+    /// Angle in radians: what is no wider is not refined any more. 0 to leave that to the settings alone.
+    pub finest: f32,
 }
 
 impl Known<'_> {
     /// Nothing: the whole sphere, no offset, no peaks.
-    pub const NOTHING: Known<'static> = Known { support: None, offset: Rgb::ZERO, peaks: &[] };
+    pub const NOTHING: Known<'static> = Known { support: None, offset: Rgb::ZERO, peaks: &[], finest: 0.0 };
 }
 
 /// A projection and what it took.

@@ -145,7 +145,7 @@ fn reflected_samples_are_represented<B: Case>() {
         .map(|sample| ward.lobe(sample.direction))
         .map(|lobe| Peak { direction: lobe.direction, width: lobe.width })
         .collect();
-    let known = Known { support, offset: Rgb::ZERO, peaks: &peaks };
+    let known = Known { support, peaks: &peaks, ..Known::NOTHING };
     let [_, fine] = B::settings();
     let made = B::project(&fine, &known, |d| ward.reflect_sum(&incident, d)).distribution;
     let (mut off, mut total, mut found) = (0.0, 0.0, 0.0);

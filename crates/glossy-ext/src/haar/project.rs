@@ -7,6 +7,7 @@ use crate::basis::triangle::{ConeTest, Triangle, midpoints};
 use crate::basis::{Known, Peak, Projected, Sampler, Support};
 use glam::Vec3;
 use hr_diffuse::Cone;
+use std::f32::consts::FRAC_PI_2;
 
 /// When a triangle is subdivided.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,9 +98,14 @@ fn peak_test(peak: &Peak, max_level: u8) -> Option<(ConeTest, u8)> {
     if !peak.direction.is_finite() || peak.direction == Vec3::ZERO {
         return None;
     }
-    let level = (0..max_level).find(|&l| std::f32::consts::FRAC_PI_2 * 0.5_f32.powi(l.into()) <= peak.width);
+    let level = level_of(peak.width, max_level);
     let cone = Cone { axis: peak.direction.normalize(), cos_angle: peak.width.clamp(0.0, std::f32::consts::PI).cos() };
-    Some((ConeTest::new(&cone), level.unwrap_or(max_level)))
+    Some((ConeTest::new(&cone), level))
+}
+
+/// The level whose triangles are no wider than an angle (radians), if there is one up to `max_level`, else that.
+fn level_of(width: f32, max_level: u8) -> u8 {
+    (0..max_level).find(|&level| FRAC_PI_2 * 0.5_f32.powi(level.into()) <= width).unwrap_or(max_level)
 }
 
 /// What has been found out about a triangle of the mesh.
@@ -118,7 +124,8 @@ impl Haar {
     ///
     /// Depends on nothing but the arguments: the same function gives the same distribution, bit by bit.
     pub fn project(settings: &Refinement, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected<Self> {
-        let (min_level, max_level) = (settings.min_level(), settings.max_level());
+        let max_level = level_of(known.finest, settings.max_level());
+        let min_level = settings.min_level().min(max_level);
         let support = known.support.as_ref();
         let within = support.map(|s| ConeTest::new(&s.cone));
         let peaks: Vec<_> = known.peaks.iter().filter_map(|p| peak_test(p, max_level)).collect();

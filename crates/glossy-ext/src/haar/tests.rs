@@ -262,6 +262,25 @@ fn peaks_are_found() {
 }
 
 #[test]
+fn nothing_is_finer_than_asked_for() {
+    let axis = Vec3::new(0.31, 0.43, 0.57).normalize();
+    let exponent = 60.0;
+    let truth = TAU / (exponent + 1.0);
+    let peaks = [Peak { direction: axis, width: 0.1 }];
+    let made = [0.0, 0.2, 0.4].map(|finest| {
+        let known = Known { peaks: &peaks, finest, ..Known::NOTHING };
+        Haar::project(&Refinement::default(), &known, lobe(axis, exponent))
+    });
+    // 90° / 2³ is 0.196, half of which is too fine.
+    let levels = made.each_ref().map(|m| level_at(&m.distribution, axis));
+    assert_eq!([levels[1], levels[2]], [3, 2], "levels in the middle of the lobe");
+    assert!(levels[0] > 3, "left to the settings: level {}", levels[0]);
+    assert!(3 * made[1].evaluations < made[0].evaluations, "{} of {}", made[1].evaluations, made[0].evaluations);
+    let ratio = made[1].distribution.integral().x / truth;
+    assert!((ratio - 1.0).abs() < 0.1, "{ratio} of the energy is left");
+}
+
+#[test]
 fn refiners_differ_in_the_dark() {
     let axis = Vec3::new(0.2, 0.3, 0.9).normalize();
     // A dim lobe far from a bright one.
