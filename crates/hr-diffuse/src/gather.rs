@@ -1,6 +1,7 @@
 //! Gather: every receiver adds up what its links carry.
 
 use crate::Rgb;
+use crate::calibrate::calibrate;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::{LightField, NodeId, Transfer};
 use crate::leaf_rows::balance;
@@ -108,6 +109,39 @@ impl Gather {
             gather.lit = gather.lit_areas(light, links);
         }
         gather
+    }
+
+    /// Compares what arrives of reflected light with what about so many rays find, and makes it so; returns the number of rays.
+    pub(crate) fn calibrate<L: LightField>(
+        &mut self,
+        light: Light<'_, L>,
+        links: &Links,
+        rays: usize,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> u64 {
+        let brought = self.reflected(light, links);
+        let Some((factors, rays)) = calibrate(light, &brought, rays, watch) else { return 0 };
+        for (row, factor) in self.rows.iter_mut().zip(factors) {
+            row[Group::Rest as usize] *= factor;
+            row[Group::Faint as usize] *= factor;
+        }
+        rays
+    }
+
+    /// By leaf, what arrives there of reflected light (sum of channels).
+    pub(crate) fn reflected<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
+        let shares = light.reflected_shares();
+        let reflected = |(link, spread): (&Link, &Spread)| {
+            carried(light, link, *spread, None).element_sum() * shares[link.sender as usize]
+        };
+        let reflected: Vec<f32> = links.all().par_iter().zip(&self.push.spreads).map(reflected).collect();
+        let even = sums(light.elements, links, &self.groups, &self.push.spreads, &reflected);
+        let brought = |index: usize| {
+            let [_, sums @ ..] = self.push.sum(light, links, index, (&self.groups, &reflected, &even));
+            let sum = sums.iter().zip(&self.rows[index][1..]).map(|(sum, factor)| sum * factor).sum();
+            (self.push.leaves[index], sum)
+        };
+        (0..self.push.leaves.len()).into_par_iter().with_min_len(64).map(brought).collect()
     }
 
     /// What links deliver: [`lit`](Self::lit).

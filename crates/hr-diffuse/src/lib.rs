@@ -11,6 +11,7 @@
 //! is the same, bit by bit.
 
 pub mod budget;
+mod calibrate;
 mod columns;
 pub mod cone;
 mod convergence;

@@ -10,6 +10,7 @@ use crate::gather::{GROUPS, Group};
 use crate::hierarchy::{Element, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
 use crate::links::{Link, Links};
+use crate::sampling::hash;
 use crate::segments::visibility;
 use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
@@ -39,8 +40,11 @@ const MOST_WEIGHT: f32 = 8.0;
 const RAYS: f32 = 64.0;
 const LEAST_RAYS: f32 = 2.0;
 const MOST_RAYS: f32 = 16.0;
-/// Links none of whose segments was free let so much through, of which each leaf finds out what is true.
+/// Links none of whose segments was free let so much through, of which each leaf finds out what is true, …
 const LEAST_VISIBLE: f32 = 0.01;
+/// … and may let through so much, for all that a few segments tell: links are looked at closely as if they did. Were only those looked
+/// at of which something is seen, the light of the others would be missing, and nowhere be too much instead.
+const MAY_BE_VISIBLE: f32 = 0.1;
 
 /// Bytes that are kept for each link, …
 pub(crate) const LINK_BYTES: usize = size_of::<Spread>() + size_of::<f32>();
@@ -140,12 +144,13 @@ impl Push {
                 let (mut slots, mut rays) = (weights.iter_mut(), 0);
                 push.each(light, links, *leaf, |place, at| {
                     if let Some(slot) = slots.next() {
-                        let (weight, shot) = place.weight(light, &links.all()[at], (push.spreads[at], push.means[at]));
+                        let known = (push.spreads[at], push.means[at]);
+                        let (weight, shot) = place.weight(light, &links.all()[at], known, rays);
                         *slot = weight;
-                        rays += u64::from(shot);
+                        rays += shot;
                     }
                 });
-                rays
+                u64::from(rays)
             });
             rays += shot.sum::<u64>();
         }
@@ -262,7 +267,7 @@ fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -
         false => f32::INFINITY,
     };
     let irradiance = light.exitant.irradiance[link.receiver as usize].element_sum();
-    let closely = mean > 0.0 && mean * visible(link, Spread::Exact) >= least * irradiance;
+    let closely = mean > 0.0 && mean * visible(link, Spread::Exact).max(MAY_BE_VISIBLE) >= least * irradiance;
     (if closely { Spread::Exact } else { even }, mean)
 }
 
@@ -311,9 +316,15 @@ impl Place {
         element.mean_cosine(direction) * scale
     }
 
-    /// The same as asked for, and the number of rays shot; `mean` is what the link would bring to its receiver if it were wholly
-    /// visible.
-    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, (spread, mean): (Spread, f32)) -> (f32, u32) {
+    /// The same as asked for, and the number of rays shot after so many `before`; `mean` is what the link would bring to its receiver
+    /// if it were wholly visible.
+    fn weight<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        link: &Link,
+        (spread, mean): (Spread, f32),
+        before: u32,
+    ) -> (f32, u32) {
         if spread != Spread::Exact {
             return (self.plain(light, link, spread), 0);
         }
@@ -327,7 +338,8 @@ impl Place {
         if far && mean * visible * self.turned(light, link) < self.faint {
             return (self.plain(light, link, spread), 0);
         }
-        let here = if !is_shared(light, link.receiver) {
+        let shared = is_shared(light, link.receiver);
+        let here = if !shared {
             mean
         } else if element.is_flat() || !far {
             let at = |&(x, n, weight): &(Vec3, Vec3, f32)| {
@@ -347,16 +359,19 @@ impl Place {
         if link.visibility < 0.0 {
             return (weight, 0);
         }
-        let (seen, rays) = self.seen(light, link, here * visible);
+        let worth = if shared { visible } else { visible.max(MAY_BE_VISIBLE) };
+        let (seen, rays) = self.seen(light, link, here * worth, before);
         (weight * seen / visible, rays)
     }
 
-    /// Share of a link's sender that the leaf sees, by as many rays as what it brings is worth, and their number.
-    fn seen<L: LightField>(&self, light: Light<'_, L>, link: &Link, brings: f32) -> (f32, u32) {
+    /// Share of a link's sender that the leaf sees, by as many rays as what it `brings` is worth, and their number. The rays of all
+    /// links go on with one sequence of points, so that they are spread evenly over the leaf.
+    fn seen<L: LightField>(&self, light: Light<'_, L>, link: &Link, brings: f32, before: u32) -> (f32, u32) {
         let irradiance = light.exitant.irradiance[self.leaf as usize].element_sum();
         let rays = (RAYS * brings / irradiance.max(f32::MIN_POSITIVE)).clamp(LEAST_RAYS, MOST_RAYS) as u32;
-        let mut blocker = u32::MAX;
-        let (seen, total, rays) = visibility(light, self.leaf, link.sender, 0..rays, (&Proof::Unknown, &mut blocker));
+        let (mut blocker, seed) = (u32::MAX, hash(self.leaf, 0x1eaf));
+        let sequence = (seed, before..before + rays);
+        let (seen, total, rays) = visibility(light, self.leaf, link.sender, sequence, (&Proof::Unknown, &mut blocker));
         (if total > 0.0 { seen / total } else { 0.0 }, rays)
     }
 }

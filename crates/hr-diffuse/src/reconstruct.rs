@@ -6,6 +6,7 @@
 //! is renewed where a link carries much of the light.
 
 use crate::Rgb;
+use crate::calibrate::{OF_VERTICES, Sums, factors};
 use crate::gather::Group;
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
@@ -33,6 +34,8 @@ const PARTIAL_SHARE: f32 = 0.002;
 const WHOLE_SHARE: f32 = 0.01;
 /// What is nearer to a vertex than this share of its leaf's radius, all around, covers it.
 const COVER: f32 = 0.25;
+/// Vertices are changed by no more than this factor to agree with their leaves.
+const MOST_CHANGE: f64 = 1.5;
 /// Vertices that a thread gathers between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 128;
 /// Most finer levels that a neighbour may have.
@@ -211,6 +214,20 @@ fn lay_out(scene: &SceneData, elements: &Elements) -> Vertices {
 }
 
 impl Vertices {
+    /// The mean irradiance over a leaf (sum of channels); `None` for a leaf without extent.
+    fn mean(&self, leaf: u32) -> Option<f32> {
+        let (middle, outline) = self.fan(leaf).split_first()?;
+        let value = |corner: &Corner| self.irradiance[corner.vertex as usize].element_sum();
+        let (mut sum, mut area) = (0.0, 0.0);
+        for (i, a) in outline.iter().enumerate() {
+            let b = &outline[(i + 1) % outline.len()];
+            let part = (a.uv - middle.uv).perp_dot(b.uv - middle.uv).abs();
+            sum += part * (value(middle) + value(a) + value(b)) / 3.0;
+            area += part;
+        }
+        (area > 0.0).then(|| sum / area)
+    }
+
     fn add(&mut self, position: Vec3, normal: Vec3, leaf: u32, uv: Vec2) {
         self.positions.push(position);
         self.normals.push(normal);
@@ -273,8 +290,33 @@ pub(crate) fn reconstruct<L: LightField>(
             covered.push(gathering.covered);
         }
     }
+    agree(light, &mut vertices);
     uncover(&mut vertices, &covered);
     (vertices, rays)
+}
+
+/// What vertices gather, with links made for something larger, is made to agree with what the leaves around have, which has been
+/// compared with more rays: region by region, so that it stays as smooth as it is.
+fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices) {
+    let compared = |leaf: u32| {
+        let element = light.element(leaf);
+        let counts = element.importance > 0.0 && light.elements.exposed(leaf) >= 1.0;
+        let mean = vertices.mean(leaf).filter(|_| counts);
+        let sums = mean.map(|mean| {
+            let weight = f64::from(element.area * element.importance);
+            let have = light.exitant.irradiance[leaf as usize];
+            Sums::of(weight * f64::from(have.element_sum()), weight * f64::from(mean))
+        });
+        (leaf, sums.unwrap_or_default())
+    };
+    let factors = factors(light.elements, light.elements.patch_leaves().map(compared), OF_VERTICES);
+    let factor = |vertex: u32| {
+        let around = vertices.leaves_around(vertex);
+        let sum: f64 = around.iter().map(|&leaf| factors[leaf as usize]).sum();
+        (sum / around.len().max(1) as f64).clamp(MOST_CHANGE.recip(), MOST_CHANGE) as f32
+    };
+    let changed: Vec<Rgb> = (0..).zip(&vertices.irradiance).map(|(vertex, before)| before * factor(vertex)).collect();
+    vertices.irradiance = changed;
 }
 
 /// Nobody sees the darkness behind a picture on a wall or below a cupboard, but interpolation would carry it to where it

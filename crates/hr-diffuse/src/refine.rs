@@ -12,6 +12,7 @@ use crate::hooks::LightField;
 use crate::links::Link;
 use crate::oracle::{FactorBounds, factor_bounds};
 use crate::proofs;
+use crate::sampling::hash;
 use crate::segments;
 use crate::skips::Skips;
 use crate::stats::Skipped;
@@ -446,13 +447,13 @@ fn decide<L: LightField>(
         link.visibility = -1.0;
         return if proof == Proof::Free { Verdict::Keep(link) } else { Verdict::Blocked };
     }
-    let worth = (first as f32 * stake(&link) / tolerance.error) as u32;
+    let (worth, seed) = ((first as f32 * stake(&link) / tolerance.error) as u32, hash(pair.receiver, pair.sender));
     let (mut blocker, mut seen, mut total, mut done) = (u32::MAX, 0.0, 0.0, 0);
     // A few at first: those of a pair that is split then are not missed.
     for segments in [first, worth.clamp(first, MOST_SEGMENTS)] {
         let start = Instant::now();
         let (free, all, rays) =
-            segments::visibility(light, pair.receiver, pair.sender, done..segments, (&proof, &mut blocker));
+            segments::visibility(light, pair.receiver, pair.sender, (seed, done..segments), (&proof, &mut blocker));
         counters.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
         counters.nanoseconds.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
         (seen, total, done) = (seen + free, total + all, segments);

@@ -258,14 +258,21 @@ fn reflected<L: LightField>(light: Light<'_, L>, leaf: u32, seed: u32) -> f32 {
         let (x, n) = point(light, leaf, Vec2::new(u.z, u.w));
         let direction = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + Vec2::new(u.x, u.y)) / GRID as f32;
         let direction = cosine_direction(n, direction.x, direction.y);
-        let Some(hit) = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface) else { continue };
-        let Some(sender) = light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv) else { continue };
-        let element = light.element(sender.0);
-        let emitted = match element.kind {
-            Kind::Front => light.scene.materials[element.material as usize].exitance.element_sum(),
-            _ => 0.0,
-        };
-        sum += (light.emitted(sender.0, -direction).element_sum() - emitted).max(0.0);
+        sum += reflected_along(light, x, direction, surface);
     }
     sum / (GRID * GRID) as f32
+}
+
+/// Light that has been reflected toward a point of a surface (π times its radiance, sum of channels) by what a ray in a direction meets.
+pub(crate) fn reflected_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> f32 {
+    let hit = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface);
+    let Some(sender) = hit.and_then(|hit| light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv)) else {
+        return 0.0;
+    };
+    let element = light.element(sender.0);
+    let emitted = match element.kind {
+        Kind::Front => light.scene.materials[element.material as usize].exitance.element_sum(),
+        _ => 0.0,
+    };
+    (light.emitted(sender.0, -direction).element_sum() - emitted).max(0.0)
 }

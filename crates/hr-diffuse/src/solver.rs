@@ -40,6 +40,8 @@ const CONVERGED_SHARE: f32 = 0.02;
 const MOST_ITERATIONS: u32 = 400;
 /// So many where light need only be there roughly.
 const FEW_ITERATIONS: u32 = 3;
+/// So many rays for each leaf are worth knowing how much reflected light links should bring.
+const CALIBRATE_RAYS: usize = 64;
 /// This share of the rays shot so far is worth knowing what the solution is off by, …
 const CHECK_SHARE: f32 = 0.1;
 /// … from at least and at most so many leaves.
@@ -264,6 +266,9 @@ impl<L: LightField> Solver<L> {
             self.prepare_watched(pass, &mut stopped, watch);
             self.settle(pass, &mut stopped, watch);
             if pass.closely && !stopped {
+                self.calibrate(pass, &mut stopped, watch);
+            }
+            if pass.closely && !stopped {
                 self.check(pass, &mut stopped, watch);
             }
             self.measure();
@@ -311,10 +316,14 @@ impl<L: LightField> Solver<L> {
     pub(crate) fn settle_again(&mut self, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let tolerance = self.unfinished.tolerance.min(1.0);
         let pass = Pass { number: 1, tolerance, reflects: true, closely: true };
-        if !self.prepared {
+        let prepared = self.prepared;
+        if !prepared {
             self.prepare_watched(pass, stopped, watch);
         }
         self.settle(pass, stopped, watch);
+        if !prepared {
+            self.calibrate(pass, stopped, watch);
+        }
     }
 
     /// Iterates until light has settled, as far as a pass needs it.
@@ -365,6 +374,27 @@ impl<L: LightField> Solver<L> {
             *stopped = *stopped || watch(&progress).is_break();
             if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
+    }
+
+    /// Compares what links bring of reflected light with what rays find, and lets light settle once more.
+    fn calibrate(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        // Where all links are proved free nothing is missing.
+        if self.stats.rays == 0 || *stopped || self.account.is_over() {
+            return;
+        }
+        let reflects = |leaf: &u32| self.elements.nodes[*leaf as usize].importance > 0.0;
+        let rays = CALIBRATE_RAYS * self.elements.patch_leaves().filter(reflects).count();
+        let start = Instant::now();
+        let progress = self.progress(Phase::Transport, pass.fraction(0.9));
+        let mut gather = std::mem::take(&mut self.gather);
+        self.stats.check_rays += gather.calibrate(self.light(), &self.links, rays, &mut || {
+            *stopped = *stopped || watch(&progress).is_break();
+            if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        self.gather = gather;
+        self.stats.seconds.check += start.elapsed().as_secs_f64();
+        self.convergence.restart();
+        self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, true), stopped, watch);
     }
 
     /// Finds what the solution is off by.

@@ -16,7 +16,7 @@ pub struct Stats {
     pub links: u64,
     /// Visibility rays shot in the solve.
     pub rays: u64,
-    /// Rays shot to find out what the solution is off by.
+    /// Rays shot to find out how much reflected light links should bring, and what the solution is off by.
     pub check_rays: u64,
     /// Visibility rays shot for values at vertices.
     pub vertex_rays: u64,

@@ -310,6 +310,15 @@ impl<L: LightField> Light<'_, L> {
         power
     }
 
+    /// By node, the share of its diffuse light that has been reflected; the rest is emitted.
+    pub(crate) fn reflected_shares(&self) -> Vec<f32> {
+        let share = |(node, emitted): (usize, f32)| {
+            let power = self.exitant.radiosity[node].element_sum() * self.elements.nodes[node].area;
+            if power > 0.0 { (1.0 - emitted / power).clamp(0.0, 1.0) } else { 0.0 }
+        };
+        self.emitted_power().into_iter().enumerate().map(share).collect()
+    }
+
     /// The element hierarchy.
     #[must_use]
     pub fn elements(&self) -> &Elements {
