@@ -240,9 +240,11 @@ impl<'a> Spots<'a> {
                 let (x, normal) = geometry.sample(Domain::WHOLE, u.x, u.y);
                 (x, if is_back(side) { -normal } else { normal })
             };
-            seen.light |= searching && sees_light(scene, surface, x, n, |_| true);
+            let direction = cosine_direction(n, u.z, u.w);
+            seen.light |=
+                searching && (sees_light(scene, surface, x, n, |_| true) || self.meets_light(surface, x, n, direction));
             let mut lit = seen.light;
-            if let Some(met) = self.meet(spot, x, n, cosine_direction(n, u.z, u.w)) {
+            if let Some(met) = self.meet(spot, x, n, direction) {
                 lit |= matches!(met, Met::Spot(other) if self.groups.is_known_lit(other));
                 seen.met.push(met);
             }
@@ -259,7 +261,31 @@ impl<'a> Spots<'a> {
         let own = self.all[spot as usize].side / 2;
         let (side, t) = visibility.first_side(x, direction, f32::MAX, own)?;
         let met = self.around(spot, side, x + direction * t)?;
-        // Between surfaces that nearly meet single rays slip through: what is seen must be seen a little beside, too.
+        self.is_confirmed(own, x, n, direction, (side, t)).then_some(met)
+    }
+
+    /// Whether a ray from a surface meets a place on a large flat side that sees a light without extent: the sun that comes
+    /// in by a window may light none of the side's spots.
+    fn meets_light(&self, own: u32, x: Vec3, n: Vec3, direction: Vec3) -> bool {
+        let scene = self.scene;
+        if scene.lights.is_empty() {
+            return false;
+        }
+        let Some((side, t)) = scene.visibility.first_side(x, direction, f32::MAX, own) else { return false };
+        let surface = side / 2;
+        self.large[surface as usize]
+            && self.of_side[side as usize] != NONE
+            && {
+                let normal = outward(&scene.surfaces()[surface as usize], side);
+                sees_light(scene, surface, x + direction * t, normal, |_| true)
+            }
+            && self.is_confirmed(own, x, n, direction, (side, t))
+    }
+
+    /// Between surfaces that nearly meet single rays slip through: what is seen from a surface with normal `n` must be seen a
+    /// little beside, too.
+    fn is_confirmed(&self, own: u32, x: Vec3, n: Vec3, direction: Vec3, (side, t): (Side, f32)) -> bool {
+        let visibility = &self.scene.visibility;
         let radius = visibility.geometries()[(side / 2) as usize].bounds(Domain::WHOLE).radius();
         let turn = BESIDE.min(BESIDE_SHARE * radius / t);
         let (a, b) = n.any_orthonormal_pair();
@@ -267,7 +293,7 @@ impl<'a> Spots<'a> {
             let met = visibility.first_side(x, direction + aside * turn, NEARLY * t, own);
             met.is_some_and(|met| met.0 == side)
         };
-        (also(a) && also(b)).then_some(met)
+        also(a) && also(b)
     }
 
     /// What a spot may be joined to that sees a place on a side; `None` where that is of its group as far as is known.

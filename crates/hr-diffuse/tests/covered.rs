@@ -1,7 +1,7 @@
 //! Objects that stand on something: no light gets below them, and none is lost there.
 
-use glam::{DVec3, Vec2};
-use hr_diffuse::{DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solution, Solver, Surface};
+use glam::{DVec3, Vec2, Vec3};
+use hr_diffuse::{DiffuseMaterial, Light, LightKind, Rgb, SceneInput, Settings, Shape, Solution, Solver, Surface};
 use std::ops::ControlFlow;
 
 fn solve(input: &SceneInput, error: f32) -> Solution {
@@ -81,4 +81,30 @@ fn no_light_is_lost_below_a_box() {
     let (whole, cut) = (walls(false), walls(true));
     // 0.3 % less at this error; 0.65 % where leaves shine with their mean over the covered part, too.
     assert!((whole / cut - 1.0).abs() < 0.004, "{whole} in front of a floor in one piece, {cut} of one cut to fit");
+}
+
+/// The sun comes in by a window and lights a part of one wall. None of the spots that are looked at first lies there.
+#[test]
+fn the_sun_through_a_window_lights_a_room() {
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let mut shapes = vec![quad(DVec3::ZERO, x, y), quad(z, y, x), quad(DVec3::ZERO, y, z)];
+    shapes.extend([quad(DVec3::ZERO, z, x), quad(y, x, z)]);
+    // The wall at x = 1, around a window of 0.4 × 0.4.
+    let at = |y: f64, z: f64| DVec3::new(1.0, y, z);
+    for [a, b, c, d] in [[0.0, 0.0, 1.0, 0.4], [0.0, 0.8, 1.0, 1.0], [0.0, 0.4, 0.3, 0.8], [0.7, 0.4, 1.0, 0.8]] {
+        shapes.push(quad(at(a, b), z * (d - b), y * (c - a)));
+    }
+    let surfaces = shapes.into_iter().map(|shape| Surface::new(shape, 0)).collect();
+    let wall = DiffuseMaterial { reflectance: Rgb::splat(0.6), exitance: Rgb::ZERO, two_sided: true };
+    let direction = Vec3::new(-1.0, 0.2, -0.3).normalize();
+    let sun = Light { position: DVec3::ZERO, intensity: Rgb::ONE, kind: LightKind::Directional { direction } };
+    let input = SceneInput { surfaces, materials: vec![wall], lights: vec![sun], ..SceneInput::default() };
+    let solution = solve(&input, 0.1);
+    // What comes in across the window ends on the walls, which reflect 0.6 of it; 0.16 / 6 of that leaves by the window.
+    let expected = 0.16 * direction.x.abs() / (1.0 - 0.6 * (1.0 - 0.16 / 6.0));
+    let areas = [1.0, 1.0, 1.0, 1.0, 1.0, 0.4, 0.2, 0.12, 0.12];
+    let irradiance = |front: u32| solution.exitant.irradiance.get(front as usize).map_or(0.0, |light| light.x);
+    let fronts = solution.elements.surface_nodes.iter().zip(areas);
+    let received: f32 = fronts.map(|([front, _], area)| area * irradiance(*front)).sum();
+    assert!((received / expected - 1.0).abs() < 0.1, "{received} of {expected}");
 }

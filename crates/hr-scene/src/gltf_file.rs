@@ -46,8 +46,8 @@ const MIN_RAMP: f32 = 1e-4;
 /// Which of the two kinds it is, the file's first bytes say.
 ///
 /// # Errors
-/// [`SceneError::Io`] where the file or one of its buffers cannot be read, [`SceneError::Syntax`] with the JSON path
-/// where it is damaged, contradicts the specification or requires an extension that is not supported,
+/// [`SceneError::Io`] where the file cannot be read, [`SceneError::Syntax`] with the JSON path where one of its buffers
+/// cannot, where it is damaged, contradicts the specification or requires an extension that is not supported,
 /// [`SceneError::Empty`] where it has no triangle. Images that cannot be read are only warned of.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
     from_bytes(&read_whole(path)?, path)

@@ -104,8 +104,9 @@ impl Scene {
             let far = 1.0 - near;
             let corners = [[near, near], [far, near], [near, far], [far, far]].map(|c| place(c, EYE_HEIGHT));
             let best = corners.into_iter().filter(inside).max_by(|a, b| view(a).total_cmp(&view(b)));
-            let eye = best.unwrap_or(place(middle, EYE_HEIGHT));
-            if (eye - target).length() > 0.0 {
+            // Rooms without corners: the place that is farthest from the middle.
+            let aside = || places.iter().rev().filter(|p| **p != middle).map(|p| place(*p, EYE_HEIGHT)).find(inside);
+            if let Some(eye) = best.or_else(aside) {
                 return camera(eye, target, 70.0);
             }
         }
@@ -439,6 +440,12 @@ mod tests {
             let free = scene.occluders().distance(eye, camera.frame().2);
             assert!(free > 0.1 * (high - low).length(), "{name}: {free} of free sight");
         }
+        let mut dome = object(Shape::Sphere { center: DVec3::ZERO, radius: 5.0 });
+        dome.surfaces[0].flip = true;
+        let camera = dome.default_camera();
+        camera.check("dome").expect("usable");
+        let eye = DVec3::from(camera.eye);
+        assert!(eye.length() < 5.0 && eye.with_y(0.0).length() > 2.0, "inside of a room without corners, aside: {eye}");
         let sphere = object(Shape::Sphere { center: DVec3::new(5.0, 6.0, 7.0), radius: 2.0 });
         let camera = sphere.default_camera();
         camera.check("object").expect("usable");

@@ -3,7 +3,7 @@
 use crate::ViewError;
 use crate::args::Args;
 use crate::progress::Progress;
-use hr_scene::{Camera, Scene};
+use hr_scene::{Camera, Rgb, Scene};
 use std::sync::Arc;
 
 /// So many warnings about the scene are told; of the others, how many there are.
@@ -22,10 +22,22 @@ pub(crate) fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewE
     if let Some(more) = scene.warnings.len().checked_sub(MOST_WARNINGS).filter(|more| *more > 0) {
         progress.say(&format!("warning: {more} more kinds of warnings"));
     }
+    if is_dark(&scene) {
+        progress.say(
+            "warning: nothing in the scene shines, all will be black; give a material emission or add a light, such as one of \
+             KHR_lights_punctual",
+        );
+    }
     if let Some(camera) = camera {
         scene.cameras.insert(0, ("--camera".to_owned(), camera));
     } else if scene.cameras.is_empty() {
         scene.cameras.push(("default".to_owned(), scene.default_camera()));
     }
     Ok(Arc::new(scene))
+}
+
+/// Whether no surface and no light emits anything.
+fn is_dark(scene: &Scene) -> bool {
+    let shines = |material: u32| scene.materials[material as usize].exitance != Rgb::ZERO;
+    scene.lights.iter().all(|light| light.intensity == Rgb::ZERO) && !scene.surfaces.iter().any(|s| shines(s.material))
 }

@@ -193,6 +193,19 @@ fn glossy_light_is_finite_and_counted() {
 }
 
 #[test]
+fn what_is_black_for_want_of_light_is_told() {
+    let folder = Folder::new("dark");
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let lamp = format!("mtllib lamp.mtl\nusemtl lamp\n{triangle}");
+    let (dark, lit) = (folder.write("dark.obj", triangle), folder.write("lit.obj", &lamp));
+    folder.write("lamp.mtl", "newmtl lamp\nKe 1 1 1\n");
+    for (scene, lights) in [(dark, 0), (lit, 1)] {
+        let text = succeeds(&[&scene, "--image", &folder.path("a.png")]);
+        assert_eq!(text.matches("nothing in the scene shines").count(), 1 - lights, "{scene}: {text}");
+    }
+}
+
+#[test]
 fn a_time_budget_ends_soon() {
     let folder = Folder::new("budget");
     let camera = folder.write("camera.json", IN_THE_FURNACE);

@@ -302,27 +302,23 @@ fn processor_seconds(child: &Child) -> Result<f64, Box<dyn Error>> {
 }
 
 fn nothing_is_drawn_while_nothing_changes() -> Outcome {
-    let mut after = Vec::new();
-    for seconds in [0, 4] {
-        let stage = Stage::of_room()?;
-        // Until all that comes with the opening of a window is over.
-        std::thread::sleep(Duration::from_secs(2));
+    let stage = Stage::of_room()?;
+    let used_in = |seconds| {
         let before = processor_seconds(&stage.child.0)?;
         std::thread::sleep(Duration::from_secs(seconds));
-        let used = processor_seconds(&stage.child.0)? - before;
-        // A frame of this room takes a software rasteriser some 30 ms.
-        if used > 0.02 {
-            return Err(format!("it computes {used} s in {seconds} s while nothing changes").into());
-        }
-        after.push(counts(&stage.close()?)?);
+        processor_seconds(&stage.child.0).map(|after| after - before)
+    };
+    // A frame of this room takes a software rasteriser some 30 ms. How long opening takes, and how many events come with it,
+    // is the window system's affair: what counts is that there is an end to it.
+    let rests = |seconds| used_in(seconds).is_ok_and(|used| used <= 0.02);
+    stage.until("it does not come to rest", |_| rests(1))?;
+    if !rests(4) {
+        return Err("it draws while nothing changes".into());
     }
-    let [[short, evaluated], [long, again]] = after[..] else { return Err("two runs".into()) };
-    if evaluated == 0 || evaluated != again {
-        return Err(format!("{evaluated} vertices were evaluated, then {again}").into());
-    }
-    // An event of the window system may come twice.
-    if short == 0 || long > short + 1 {
-        return Err(format!("{short} frames, then {long} in 4 seconds more").into());
+    let [frames, evaluated] = counts(&stage.close()?)?;
+    // The eye has not moved: those vertices of the floor that are in sight once, however many frames there were.
+    if frames == 0 || !(1..=33 * 33).contains(&evaluated) {
+        return Err(format!("{frames} frames, {evaluated} vertices evaluated").into());
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use crate::SceneError;
 use crate::error::quoted;
-use crate::whole_file::read_whole;
+use crate::whole_file::read;
 use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{self, Root};
 use std::path::{Path, PathBuf};
@@ -24,8 +24,14 @@ type Chunks<'a> = (std::borrow::Cow<'a, [u8]>, Option<Vec<u8>>);
 /// The part of a document that is looked at before the rest is expected to make sense.
 #[derive(serde::Deserialize)]
 struct Preamble {
+    asset: Option<Asset>,
     #[serde(default, rename = "extensionsRequired")]
     extensions_required: Vec<String>,
+}
+
+#[derive(serde::Deserialize)]
+struct Asset {
+    version: Option<String>,
 }
 
 impl Document {
@@ -35,6 +41,14 @@ impl Document {
         let (text, mut blob) = this.split(bytes)?;
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
         let preamble: Preamble = serde_json::from_slice(text).map_err(|e| this.no_json(&e))?;
+        let version = preamble.asset.and_then(|asset| asset.version);
+        if let Some(version) = version.filter(|version| !version.starts_with("2.")) {
+            return Err(this.wrong(
+                "asset.version",
+                format!("the file is glTF {}", quoted(&version)),
+                "export it anew as glTF 2.0",
+            ));
+        }
         for (i, name) in preamble.extensions_required.iter().enumerate() {
             if !SUPPORTED.contains(&name.as_str()) {
                 return Err(this.wrong(
@@ -98,9 +112,11 @@ impl Document {
         let mut faults = Vec::new();
         self.root.validate(&self.root, json::Path::new, &mut |path, fault| {
             let path = path().to_string();
+            // Where extensions bring images of other kinds, textures may have none of their own.
             let unused = path.ends_with("[\"POSITION\"]")
                 || path.ends_with("[\"POSITION\"].min")
-                || path.ends_with("[\"POSITION\"].max");
+                || path.ends_with("[\"POSITION\"].max")
+                || path.starts_with("textures[") && path.ends_with(".source");
             if !(unused && matches!(fault, Fault::Missing)) {
                 faults.push((path, fault));
             }
@@ -157,7 +173,13 @@ impl Document {
                 )
             })?;
         let path = self.path.parent().unwrap_or(Path::new("")).join(relative);
-        read_whole(&path)
+        read(&path).map_err(|e| {
+            self.wrong(
+                place,
+                format!("{} cannot be read ({e})", path.display()),
+                "lay that file beside this one, or export all in one as .glb",
+            )
+        })
     }
 
     /// The bytes of a buffer view.

@@ -168,7 +168,10 @@ impl Materials {
         if let Some(known) = self.images.get(&(number, srgb)) {
             return known.clone();
         }
-        let image = document.root.images.get(number)?;
+        let Some(image) = document.root.images.get(number) else {
+            warnings.add("texture left out: it has no image that is PNG or JPEG", || place.to_owned());
+            return None;
+        };
         let at = format!("images[{number}]");
         let bytes = match (&image.buffer_view, &image.uri) {
             (Some(view), _) => document.view(view.value(), &at).map(std::borrow::Cow::from),

@@ -206,7 +206,9 @@ fn json_files_with_data_uris_and_with_files_give_the_same() {
     document["buffers"][0]["uri"] = json!("missing.bin");
     std::fs::write(folder.path("a.gltf"), document.to_string()).expect("written");
     let error = load(&folder.path("a.gltf")).expect_err("a file is missing").to_string();
-    assert!(error.contains("missing.bin"), "{error}");
+    for part in ["a.gltf: buffers[0].uri: ", "missing.bin cannot be read", "lay that file beside this one"] {
+        assert!(error.contains(part), "{error}");
+    }
 }
 
 #[test]
@@ -603,6 +605,23 @@ fn required_extensions_are_named() {
     b.set("extensionsRequired", json!(["KHR_texture_basisu"]));
     b.set("textures", json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]));
     assert!(b.error().contains("PNG or JPEG"), "said before what else is missing");
+}
+
+#[test]
+fn images_that_only_an_extension_has_are_left_out() {
+    let mut b = textured(&json!({}));
+    b.set("extensionsUsed", json!(["EXT_texture_webp"]));
+    b.set("textures", json!([{"extensions": {"EXT_texture_webp": {"source": 0}}}]));
+    let scene = b.scene();
+    assert!(scene.materials[0].texture.is_none(), "nothing to show");
+    assert!(warned(&scene, "EXT_texture_webp is not simulated") && warned(&scene, "no image that is PNG or JPEG"));
+}
+
+#[test]
+fn other_versions_are_named() {
+    let text = br#"{"asset": {"version": "1.0"}, "scenes": {"defaultScene": {"nodes": []}}}"#;
+    let error = from_bytes(text, Path::new("old.gltf")).expect_err("not 2.0").to_string();
+    assert_eq!(error, "old.gltf: asset.version: the file is glTF '1.0'; export it anew as glTF 2.0");
 }
 
 #[test]
