@@ -15,7 +15,7 @@ use crate::reflect::Senders;
 use crate::resume::Unfinished;
 use crate::solution::Solution;
 use crate::solver::scene_data;
-use crate::stats::{Seconds, Skipped, Stats};
+use crate::stats::{Skipped, Stats};
 use crate::transport::Exitant;
 use crate::{Rgb, SceneInput, SolveError};
 use std::io;
@@ -302,7 +302,8 @@ impl Vertices {
 }
 
 impl Stats {
-    fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+    /// All counters, in the order in which they are kept.
+    fn counters(&mut self) -> [&mut u64; 19] {
         let Self {
             polygons,
             nodes,
@@ -312,17 +313,17 @@ impl Stats {
             check_rays,
             vertex_rays,
             pairs,
-            iterations,
+            iterations: _,
             links_evaluated,
-            ref residuals,
-            error,
-            bias,
-            stopped,
-            spent,
+            residuals: _,
+            error: _,
+            bias: _,
+            stopped: _,
+            spent: _,
             bytes,
             skipped,
             seconds: _,
-        } = *self;
+        } = self;
         let Skipped {
             black_receivers,
             unlit_senders,
@@ -334,91 +335,60 @@ impl Stats {
             faint_links,
             shot_links,
         } = skipped;
-        let spent = match spent {
+        [
+            polygons,
+            nodes,
+            leaves,
+            links,
+            rays,
+            check_rays,
+            vertex_rays,
+            pairs,
+            links_evaluated,
+            bytes,
+            black_receivers,
+            unlit_senders,
+            facing,
+            proved_free,
+            proved_blocked,
+            sealed_sides,
+            converged_leaves,
+            faint_links,
+            shot_links,
+        ]
+    }
+
+    fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+        let spent = match self.spent {
             None => 0_u64,
             Some(Spent::Time) => 1,
             Some(Spent::Memory) => 2,
         };
-        out.put(&[
-            polygons,
-            nodes,
-            leaves,
-            links,
-            rays,
-            check_rays,
-            vertex_rays,
-            pairs,
-            iterations.into(),
-            links_evaluated,
-            bytes,
-        ])?;
-        out.put(&[stopped.into(), spent])?;
-        out.put(&[
-            black_receivers,
-            unlit_senders,
-            facing,
-            proved_free,
-            proved_blocked,
-            sealed_sides,
-            converged_leaves,
-            faint_links,
-            shot_links,
-        ])?;
-        out.put(residuals)?;
-        out.put(error.as_slice())?;
-        out.put(&[bias])
+        out.put(&self.clone().counters().map(|counter| *counter))?;
+        out.put(&[self.iterations.into(), self.stopped.into(), spent])?;
+        out.put(&self.residuals)?;
+        out.put(self.error.as_slice())?;
+        out.put(&[self.bias])
     }
 
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
-        let [polygons, nodes, leaves, links, rays, check_rays, vertex_rays, pairs, iterations, links_evaluated, bytes] =
-            from.take_exactly(WHAT)?;
-        let [stopped, spent] = from.take_exactly::<u64, 2>(WHAT)?;
-        let [
-            black_receivers,
-            unlit_senders,
-            facing,
-            proved_free,
-            proved_blocked,
-            sealed_sides,
-            converged_leaves,
-            faint_links,
-            shot_links,
-        ] = from.take_exactly(WHAT)?;
-        Ok(Self {
-            polygons,
-            nodes,
-            leaves,
-            links,
-            rays,
-            check_rays,
-            vertex_rays,
-            pairs,
-            links_evaluated,
-            iterations: u64::try_into(iterations).map_err(|_| FlatError::Misfit(WHAT))?,
-            residuals: from.take(WHAT)?,
-            error: from.take_finite(WHAT)?.first().copied(),
-            bias: from.take_exactly::<f32, 1>(WHAT)?[0],
-            stopped: stopped != 0,
-            spent: match spent {
-                0 => None,
-                1 => Some(Spent::Time),
-                2 => Some(Spent::Memory),
-                _ => return Err(FlatError::Misfit(WHAT)),
-            },
-            bytes,
-            skipped: Skipped {
-                black_receivers,
-                unlit_senders,
-                facing,
-                proved_free,
-                proved_blocked,
-                sealed_sides,
-                converged_leaves,
-                faint_links,
-                shot_links,
-            },
-            seconds: Seconds::default(),
-        })
+        let mut stats = Self::default();
+        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 19>(WHAT)?) {
+            *counter = kept;
+        }
+        let [iterations, stopped, spent] = from.take_exactly::<u64, 3>(WHAT)?;
+        stats.iterations = iterations.try_into().map_err(|_| FlatError::Misfit(WHAT))?;
+        stats.stopped = stopped != 0;
+        stats.spent = match spent {
+            0 => None,
+            1 => Some(Spent::Time),
+            2 => Some(Spent::Memory),
+            _ => return Err(FlatError::Misfit(WHAT)),
+        };
+        stats.residuals = from.take(WHAT)?;
+        stats.error = from.take_finite(WHAT)?.first().copied();
+        [stats.bias] = from.take_exactly(WHAT)?;
+        Ok(stats)
     }
 }

@@ -11,6 +11,7 @@ use crate::error::SolveError;
 use crate::hierarchy::Elements;
 use crate::hooks::LightField;
 use crate::solver::{Progress, Solver, check, unit_lights};
+use crate::stats::Stats;
 use crate::transport::Exitant;
 use crate::{Light, LightKind, Rgb, SceneInput};
 use std::ops::ControlFlow;
@@ -75,6 +76,12 @@ impl<L: LightField> Solver<L> {
     #[must_use]
     pub fn exitant(&self) -> &Exitant {
         &self.exitant
+    }
+
+    /// Work done and avoided so far.
+    #[must_use]
+    pub fn stats(&self) -> &Stats {
+        &self.stats
     }
 
     /// What has links.

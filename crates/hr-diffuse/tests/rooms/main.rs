@@ -1,0 +1,6 @@
+//! Rooms that are lit, edited, and gone on with.
+
+mod fixtures;
+mod relight;
+mod resume;
+mod shooting;
