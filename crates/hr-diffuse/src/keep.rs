@@ -303,7 +303,7 @@ impl Vertices {
 
 impl Stats {
     /// All counters, in the order in which they are kept.
-    fn counters(&mut self) -> [&mut u64; 19] {
+    fn counters(&mut self) -> [&mut u64; 21] {
         let Self {
             polygons,
             nodes,
@@ -313,6 +313,8 @@ impl Stats {
             check_rays,
             vertex_rays,
             pairs,
+            renewed_links,
+            kept_links,
             iterations: _,
             links_evaluated,
             residuals: _,
@@ -344,6 +346,8 @@ impl Stats {
             check_rays,
             vertex_rays,
             pairs,
+            renewed_links,
+            kept_links,
             links_evaluated,
             bytes,
             black_receivers,
@@ -374,7 +378,7 @@ impl Stats {
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
         let mut stats = Self::default();
-        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 19>(WHAT)?) {
+        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 21>(WHAT)?) {
             *counter = kept;
         }
         let [iterations, stopped, spent] = from.take_exactly::<u64, 3>(WHAT)?;

@@ -108,7 +108,7 @@ impl<L: LightField> Solver<L> {
         field: Option<L>,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<(), SolveError> {
-        self.can_take(input, field.as_ref())?;
+        self.can_take(input, field.as_ref(), false)?;
         let lights = unit_lights(input, &self.scene.normalization)?;
         let before = (
             std::mem::replace(&mut self.scene.materials, input.materials.clone()),
@@ -254,8 +254,8 @@ impl<L: LightField> Solver<L> {
         self.stats.stopped = stopped;
     }
 
-    /// Whether a scene differs from this one by what links do not depend on.
-    fn can_take(&self, input: &SceneInput, field: Option<&L>) -> Result<(), SolveError> {
+    /// Whether a scene differs from this one by what links do not depend on, or also by where lights are where these may move.
+    pub(crate) fn can_take(&self, input: &SceneInput, field: Option<&L>, moves: bool) -> Result<(), SolveError> {
         check(input)?;
         let refused = |what, index| Err(SolveError::Edit { what, index });
         let surfaces: Vec<u32> = input.surfaces.iter().map(|surface| surface.material).collect();
@@ -286,7 +286,7 @@ impl<L: LightField> Solver<L> {
             return refused("lights were added or removed, first of all light", 0);
         }
         for (l, (new, old)) in input.lights.iter().zip(&self.scene.lights).enumerate() {
-            if !is_same(new, old) {
+            if !moves && !is_same(new, old) {
                 return refused("it has another place, direction or cone now: light", l);
             }
             if !self.linked.lights[l] && new.intensity != Rgb::ZERO {

@@ -306,6 +306,29 @@ impl<L: LightField> Solver<L> {
         });
     }
 
+    /// Solves on where pairs have come to wait that had links: first those get links again, as fine as all others, and light
+    /// settles roughly over them.
+    pub(crate) fn solve_again(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        self.area = self.elements.nodes[0].area.max(f32::MIN_POSITIVE);
+        self.stats.spent = None;
+        self.stats.residuals.clear();
+        self.restart();
+        self.pull();
+        let (mut stopped, tolerance) = (false, self.unfinished.tolerance);
+        if tolerance.is_finite() {
+            let (reflects, _) = is_worth(tolerance, self.settings.error);
+            let pass = Pass { number: 0, tolerance, reflects, closely: false };
+            let kept = self.links.take();
+            self.refine(pass, &mut stopped, watch);
+            self.links = Links::new([kept, self.links.take()].concat(), self.elements.nodes.len());
+            if !stopped {
+                self.prepare_watched(pass, &mut stopped, watch);
+                self.settle(pass, &mut stopped, watch);
+            }
+        }
+        self.solve(&mut |progress| if stopped { ControlFlow::Break(()) } else { watch(progress) });
+    }
+
     /// Lets light settle anew over the links that there are, for which it is found out how they reach leaves where it is not
     /// known yet.
     pub(crate) fn settle_again(&mut self, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
@@ -730,8 +753,12 @@ pub(crate) fn check(input: &SceneInput) -> Result<(), SolveError> {
 
 /// Checks a scene and maps it to unit space.
 pub(crate) fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
+    scene_in(input, Normalization::new(&input.surfaces))
+}
+
+/// Checks a scene and maps it to a unit space that there is.
+pub(crate) fn scene_in(input: &SceneInput, normalization: Normalization) -> Result<SceneData, SolveError> {
     check(input)?;
-    let normalization = Normalization::new(&input.surfaces);
     let surfaces = input
         .surfaces
         .iter()
