@@ -24,6 +24,7 @@ pub mod geometry;
 pub mod hierarchy;
 pub mod hooks;
 pub mod keep;
+mod kept_weights;
 mod leaf_rows;
 pub mod links;
 mod moved;

@@ -12,6 +12,7 @@ use crate::exposed::{TOUCHING, expose_again};
 use crate::geometry::Geometry;
 use crate::hierarchy::{GRAFT, SceneData, grafted, make_room};
 use crate::hooks::LightField;
+use crate::kept_weights::KeptWeights;
 use crate::links::Links;
 use crate::moved::{Moved, is_within_reach};
 use crate::refine::Pair;
@@ -59,11 +60,15 @@ impl<L: LightField> Solver<L> {
         }
         self.expose_near(&moved, &sealed);
         let waiting = std::mem::take(&mut self.unfinished.unlit);
-        let links = self.links.take();
-        let before = links.len();
-        let Renewal { kept, waiting, again } = renewal(&self.scene, &self.elements, &moved, links, waiting);
-        (self.stats.kept_links, self.stats.renewed_links) = (kept.len() as u64, (before - kept.len()) as u64);
-        self.links = Links::new(kept, self.elements.nodes.len());
+        let links = std::mem::take(&mut self.links);
+        let Renewal { stays, waiting, again } = renewal(&self.scene, &self.elements, &moved, links.all(), waiting);
+        let kept = links.all().iter().zip(&stays).filter(|(_, stays)| **stays).map(|(link, _)| *link);
+        self.links = Links::new(kept.collect(), self.elements.nodes.len());
+        self.stats.kept_links = self.links.all().len() as u64;
+        self.stats.renewed_links = links.all().len() as u64 - self.stats.kept_links;
+        let prepared = std::mem::replace(&mut self.prepared, false);
+        let (gather, radiosity) = (std::mem::take(&mut self.gather), self.exitant.radiosity.clone());
+        self.kept_weights = prepared.then(|| KeptWeights::new(gather, links, stays, moved, radiosity));
         self.unfinished.unlit = [waiting, again].concat();
         self.unfinished.found = f32::INFINITY;
         // Light may come from elsewhere, though it is as much.
@@ -134,6 +139,7 @@ impl<L: LightField> Solver<L> {
             *pair = Pair { receiver: grafted(pair.receiver), sender: grafted(pair.sender) };
         }
         let old = grafted(0);
+        self.gather.grafted();
         let pairs = [(old, GRAFT), (GRAFT, old), (GRAFT, GRAFT)].map(|(receiver, sender)| Pair { receiver, sender });
         self.unfinished.unlit.extend(pairs);
     }

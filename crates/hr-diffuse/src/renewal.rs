@@ -14,7 +14,8 @@ use std::ops::Range;
 /// What is left as it is, and what is to be looked at.
 #[derive(Debug)]
 pub(crate) struct Renewal {
-    pub(crate) kept: Vec<Link>,
+    /// By link: whether it stays.
+    pub(crate) stays: Vec<bool>,
     /// Pairs that wait for light as before.
     pub(crate) waiting: Vec<Pair>,
     /// Pairs to be looked at as if there had never been a link.
@@ -26,12 +27,12 @@ pub(crate) fn renewal(
     scene: &SceneData,
     elements: &Elements,
     moved: &Moved,
-    links: Vec<Link>,
+    links: &[Link],
     waiting: Vec<Pair>,
 ) -> Renewal {
     let linked = links.iter().map(|link| Pair { receiver: link.receiver, sender: link.sender });
     let mut known: Vec<(usize, Pair)> = linked.chain(waiting.iter().copied()).enumerate().collect();
-    let mut dropped = vec![false; known.len()];
+    let mut stays = vec![true; known.len()];
     let mut again = Vec::new();
     let tour = Tour::new(elements);
     let mut open = vec![(Pair { receiver: 0, sender: 0 }, 0..known.len())];
@@ -43,7 +44,7 @@ pub(crate) fn renewal(
         let within = &known[range.clone()];
         let renewed = moved.is_all_of(pair.receiver) || moved.is_all_of(pair.sender);
         if renewed || within.iter().all(|(_, part)| *part == pair) {
-            within.iter().for_each(|(index, _)| dropped[*index] = true);
+            within.iter().for_each(|(index, _)| stays[*index] = false);
             again.push(pair);
             continue;
         }
@@ -59,10 +60,10 @@ pub(crate) fn renewal(
             row = end;
         }
     }
-    let (of_links, of_waiting) = dropped.split_at(links.len());
-    let kept = links.into_iter().zip(of_links).filter(|(_, dropped)| !**dropped).map(|(link, _)| link).collect();
-    let waiting = waiting.into_iter().zip(of_waiting).filter(|(_, dropped)| !**dropped).map(|(pair, _)| pair).collect();
-    Renewal { kept, waiting, again }
+    let waiting = waiting.into_iter().zip(&stays[links.len()..]).filter(|(_, stays)| **stays).map(|(pair, _)| pair);
+    let waiting = waiting.collect();
+    stays.truncate(links.len());
+    Renewal { stays, waiting, again }
 }
 
 /// Receivers and senders that a pair was divided into: what is known of its parts lies within pairs of these.

@@ -9,6 +9,7 @@ use crate::gather::Gather;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
+use crate::kept_weights::KeptWeights;
 use crate::links::Links;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
@@ -141,7 +142,9 @@ pub struct Solver<L: LightField = ()> {
     /// What arrives through the links there are.
     pub(crate) gather: Gather,
     /// Whether it is known for these links as well as it can be.
-    prepared: bool,
+    pub(crate) prepared: bool,
+    /// What of it stays known for the next links.
+    pub(crate) kept_weights: Option<KeptWeights>,
     /// What has links.
     pub(crate) linked: Linked,
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
@@ -228,6 +231,7 @@ impl<L: LightField> Solver<L> {
             unfinished: Unfinished::new(Vec::new()),
             gather: Gather::default(),
             prepared: false,
+            kept_weights: None,
             linked: Linked::default(),
             faint,
             strong,
@@ -322,7 +326,8 @@ impl<L: LightField> Solver<L> {
             self.refine(pass, &mut stopped, watch);
             self.links = Links::new([kept, self.links.take()].concat(), self.elements.nodes.len());
             if !stopped {
-                self.prepare_watched(pass, &mut stopped, watch);
+                let known = self.kept_weights.as_mut().map(|known| known.rough = true);
+                self.prepare_watched(Pass { closely: known.is_some(), ..pass }, &mut stopped, watch);
                 self.settle(pass, &mut stopped, watch);
             }
         }
@@ -538,7 +543,10 @@ impl<L: LightField> Solver<L> {
         let start = Instant::now();
         let error = tolerance.map(|tolerance| if self.skips.faint_links { tolerance } else { 0.0 });
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
-        self.gather = Gather::new(self.light(), &self.links, error, room, watch);
+        let known = tolerance.and_then(|_| self.kept_weights.take());
+        let known = known.map(|known| known.with_light(&self.elements, &self.exitant, self.settings.error));
+        self.gather = Gather::new(self.light(), &self.links, error, (room, known.as_ref()), watch);
+        self.kept_weights = known.and_then(KeptWeights::once_more);
         self.prepared = tolerance.is_some();
         self.stats.rays += self.gather.rays();
         self.stats.skipped.faint_links = self.gather.faint_links();
