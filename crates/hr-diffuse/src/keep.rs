@@ -1,5 +1,5 @@
-//! Solutions to be kept: as flat arrays, and from them again. Geometry is not among them: it comes from the scene, and
-//! whoever restores a solution sees to it that it is the same one.
+//! Solutions to be kept: as flat arrays, and from them again. Geometry is not among them, only the tree over it: it comes from
+//! the scene, and whoever restores a solution sees to it that it is the same one.
 //!
 //! What is read is checked as if it came from an enemy: all indices lie within what they point into, the hierarchy is a
 //! tree, all light is finite.
@@ -14,10 +14,11 @@ use crate::refine::Pair;
 use crate::reflect::Senders;
 use crate::resume::Unfinished;
 use crate::solution::Solution;
-use crate::solver::scene_data;
+use crate::solver::scene_by;
 use crate::stats::{Skipped, Stats};
 use crate::transport::Exitant;
-use crate::{Rgb, SceneInput, SolveError};
+use crate::visibility::Visibility;
+use crate::{Normalization, Rgb, SceneInput, SolveError};
 use std::io;
 use std::time::Instant;
 
@@ -67,6 +68,10 @@ impl<L: Keep> Solution<L> {
     /// # Errors
     /// Those of what is written to.
     pub fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+        // Things may have moved since it was made.
+        out.put(&self.scene.normalization.to_array())?;
+        out.put(&self.scene.twins)?;
+        self.scene.visibility.store(out)?;
         self.stats.store(out)?;
         self.elements.store(out)?;
         self.exitant.store(out)?;
@@ -84,7 +89,15 @@ impl<L: Keep> Solution<L> {
     /// Where the scene cannot be used, or the arrays are not those of a solution of a scene like this.
     pub fn restore(input: &SceneInput, field: L, from: &mut Reader<'_>) -> Result<Self, RestoreError> {
         let start = Instant::now();
-        let scene = scene_data(input)?;
+        const SPACE: &str = "unit space";
+        let normalization = Normalization::from_array(from.take_exactly(SPACE)?).ok_or(FlatError::Misfit(SPACE))?;
+        let scene = scene_by(input, normalization, |surfaces, _| {
+            let twins: Vec<u32> = from.take("coinciding surfaces")?;
+            let is_sound = |(surface, &twin): (usize, &u32)| twin as usize <= surface && twins[twin as usize] == twin;
+            let fit = twins.len() == surfaces.len() && twins.iter().enumerate().all(is_sound);
+            fits(fit, "coinciding surfaces")?;
+            Ok::<_, RestoreError>((Visibility::restore(surfaces, &twins, from)?, twins))
+        })?;
         let mut stats = Stats::restore(from)?;
         let elements = Elements::restore(&scene, from)?;
         let count = elements.nodes.len();

@@ -20,6 +20,7 @@ use crate::shooting::Shot;
 use crate::skips::Skips;
 use crate::stats::Stats;
 use crate::steady;
+use crate::threads::prelude::*;
 use crate::transport::{Exitant, Light};
 use crate::twins::twins;
 use crate::visibility::Visibility;
@@ -766,20 +767,30 @@ pub(crate) fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
 
 /// Checks a scene and maps it to a unit space that there is.
 pub(crate) fn scene_in(input: &SceneInput, normalization: Normalization) -> Result<SceneData, SolveError> {
+    scene_by(input, normalization, |surfaces, materials| {
+        let twins = twins(&surfaces, materials);
+        Ok((Visibility::with_twins(&surfaces, &twins), twins))
+    })
+}
+
+/// Checks a scene and maps it to a unit space that there is; a closure makes of surfaces and materials what answers rays, and
+/// tells which surfaces coincide.
+pub(crate) fn scene_by<E: From<SolveError>>(
+    input: &SceneInput,
+    normalization: Normalization,
+    rays: impl FnOnce(Vec<Geometry>, &[u32]) -> Result<(Visibility, Vec<u32>), E>,
+) -> Result<SceneData, E> {
     check(input)?;
-    let surfaces = input
-        .surfaces
-        .iter()
-        .enumerate()
-        .map(|(surface, s)| {
-            Geometry::from_surface(s, &normalization).map_err(|source| SolveError::Surface { surface, source })
-        })
-        .collect::<Result<Vec<_>, _>>()?;
+    let all = input.surfaces.par_iter().with_min_len(256).enumerate().map(|(surface, s)| {
+        Geometry::from_surface(s, &normalization).map_err(|source| SolveError::Surface { surface, source })
+    });
+    // The first error of all, whichever thread finds one first.
+    let surfaces = all.collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()?;
     let lights = unit_lights(input, &normalization)?;
     let surface_materials: Vec<u32> = input.surfaces.iter().map(|s| s.material).collect();
-    let twins = twins(&surfaces, &surface_materials);
+    let (visibility, twins) = rays(surfaces, &surface_materials)?;
     Ok(SceneData {
-        visibility: Visibility::with_twins(&surfaces, &twins),
+        visibility,
         surface_materials,
         twins,
         shading_normals: input.surfaces.iter().map(|s| s.shading_normals).collect(),
