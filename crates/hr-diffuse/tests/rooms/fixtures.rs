@@ -1,7 +1,10 @@
 //! What the rooms are made of.
 
 use glam::DVec3;
-use hr_diffuse::{DiffuseMaterial, Light, LightKind, Progress, Rgb, SceneInput, Settings, Shape, Solver, Surface};
+use hr_diffuse::flat::Writer;
+use hr_diffuse::{
+    DiffuseMaterial, Light, LightKind, Progress, Rgb, SceneInput, Settings, Shape, Solution, Solver, Surface,
+};
 use std::ops::ControlFlow;
 
 /// A parallelogram, counter-clockwise.
@@ -70,4 +73,13 @@ pub(crate) fn sides(solver: &Solver) -> Vec<Rgb> {
 pub(crate) fn apart(a: &[Rgb], b: &[Rgb]) -> f32 {
     assert_eq!(a.len(), b.len(), "the same sides");
     a.iter().zip(b).map(|(a, b)| ((*a - *b).abs() / b.max(Rgb::splat(1e-6))).max_element()).fold(0.0, f32::max)
+}
+
+/// A solution as it is kept.
+pub(crate) fn stored(solution: &Solution) -> Vec<u64> {
+    let mut bytes = Vec::new();
+    solution.store(&mut Writer::new(&mut bytes)).expect("memory takes everything");
+    let (words, rest) = bytes.as_chunks::<8>();
+    assert!(rest.is_empty(), "arrays end at words");
+    words.iter().map(|word| u64::from_ne_bytes(*word)).collect()
 }

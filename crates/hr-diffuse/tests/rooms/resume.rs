@@ -1,8 +1,8 @@
 //! A solve that goes on after a stop ends at the answer of one that was not stopped.
 
-use crate::fixtures::{lamp, on, paint, quad, table, walls};
+use crate::fixtures::{lamp, on, paint, quad, stored, table, walls};
 use glam::DVec3;
-use hr_diffuse::flat::{Reader, Writer};
+use hr_diffuse::flat::Reader;
 use hr_diffuse::{Budget, Rgb, SceneInput, Settings, Shape, Solution, SolveError, Solver, Surface};
 use std::ops::ControlFlow;
 
@@ -98,18 +98,9 @@ fn spent_budgets_are_no_end() {
 #[test]
 fn what_is_kept_goes_on_as_if_it_had_never_been_away() {
     let stopped = || finished(new(ERROR), 40);
-    let mut bytes = Vec::new();
-    stopped().store(&mut Writer::new(&mut bytes)).expect("memory takes everything");
-    let words = words_of(&bytes);
+    let words = stored(&stopped());
     let read = Solution::restore(&room(), (), &mut Reader::new(&words)).expect("what was written");
     let (there, here) = (go_on(read, ERROR), go_on(stopped(), ERROR));
     assert_eq!(there.links.all(), here.links.all(), "links");
     assert_eq!(there.exitant.irradiance, here.exitant.irradiance, "light");
-}
-
-/// Bytes as words; there are whole ones.
-fn words_of(bytes: &[u8]) -> Vec<u64> {
-    let (words, rest) = bytes.as_chunks::<8>();
-    assert!(rest.is_empty(), "arrays end at words");
-    words.iter().map(|word| u64::from_ne_bytes(*word)).collect()
 }
