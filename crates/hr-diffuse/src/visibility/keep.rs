@@ -1,4 +1,4 @@
-//! The tree over surfaces as flat arrays: it takes longer to build than all else of a solution takes to read.
+//! The tree over surfaces as flat arrays, so that it need not be built anew for a solution that is read.
 
 use super::{LEAF, Leaf, Node, Primitive, Visibility};
 use crate::flat::{FlatError, Reader, Writer, fits};
