@@ -30,6 +30,8 @@ pub enum Command {
     Threads(ThreadsArgs),
     /// Gathering against shooting: a Markdown table
     Transport(TransportArgs),
+    /// Moved objects and lamps against fresh solves: a Markdown table
+    Edits(EditsArgs),
     /// Form factors against closed forms and brute force: a Markdown table
     FormFactors(FormFactorArgs),
     /// How tight the oracle's bounds of form factors are: a Markdown table
@@ -192,6 +194,18 @@ pub struct ThreadsArgs {
     /// A scene file or the name of a built-in scene
     #[arg(value_name = "SCENE", default_value = hr_scene::builtin::DEFAULT)]
     pub scene: String,
+
+    /// Error to ask for
+    #[arg(long, value_name = "E", default_value_t = 0.05)]
+    pub error: f32,
+}
+
+/// Of `hr-bench edits`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct EditsArgs {
+    /// Scene files or names of built-in scenes; all built-in ones where none is given
+    #[arg(value_name = "SCENE")]
+    pub scenes: Vec<String>,
 
     /// Error to ask for
     #[arg(long, value_name = "E", default_value_t = 0.05)]

@@ -10,6 +10,7 @@
 //! | `growth` | time and memory of generated scenes over their size |
 //! | `threads` | what more threads bring, and that they change nothing |
 //! | `transport` | gathering against shooting |
+//! | `edits` | moved objects and lamps against fresh solves |
 //! | `form-factors` | form factors against closed forms and brute force |
 //! | `bounds` | how tight the oracle's bounds are |
 //! | `visibility` | rays per second, and links that need none |
@@ -21,6 +22,7 @@ pub mod args;
 pub mod bounds;
 pub mod compare;
 pub mod curve;
+pub mod edits;
 pub mod error;
 pub mod float_image;
 pub mod form_factors;

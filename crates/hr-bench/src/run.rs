@@ -4,7 +4,7 @@ use crate::args::{AccuracyArgs, Cli, Command, CompareArgs, ReferenceArgs, Thread
 use crate::compare::{compare, luminance};
 use crate::views::{Making, listed, path_traced};
 use crate::{
-    BenchError, accuracy, bounds, curve, float_image, form_factors, frames, growth, paper, threads, transport,
+    BenchError, accuracy, bounds, curve, edits, float_image, form_factors, frames, growth, paper, threads, transport,
     visibility,
 };
 use hr_scene::{Camera, ImageKind, Scene, ToneMap, builtin};
@@ -30,6 +30,7 @@ pub fn run(cli: &Cli, out: Out<'_>) -> Result<(), BenchError> {
         Command::Growth(args) => growth::report(args, out),
         Command::Threads(args) => measure_threads(args, out),
         Command::Transport(args) => transport::report(args, out),
+        Command::Edits(args) => edits::report(args, out),
         Command::FormFactors(args) => form_factors::report(args.samples, out),
         Command::Bounds(args) => bounds::report(args, out),
         Command::Visibility(args) => measure_visibility(args, out),

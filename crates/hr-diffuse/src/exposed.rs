@@ -24,7 +24,7 @@ const RAYS: u32 = 3;
 const LEAST: f32 = 0.5;
 
 /// What stands this much above a surface, in unit space, or less, is taken to stand on it.
-const TOUCHING: f32 = 1e-3;
+pub(crate) const TOUCHING: f32 = 1e-3;
 /// How far corners must lie to one side of a plane to count: an edge that surfaces share may be off by its rounding.
 const ASIDE: f32 = 1e-5;
 
@@ -49,6 +49,15 @@ pub(crate) fn expose(scene: &SceneData, elements: &mut Elements) {
             elements.exposed[node] = open / area;
         }
     }
+}
+
+/// Finds them anew for the nodes of some surfaces; those above are found by [`expose`].
+pub(crate) fn expose_again(scene: &SceneData, elements: &mut Elements, of: impl Fn(u32) -> bool + Sync) {
+    let exposed = elements.exposed.par_iter().enumerate().with_min_len(64).map(|(node, &before)| {
+        let element = &elements.nodes[node];
+        if element.is_patch() && of(element.source) { exposed_share(scene, elements, node as u32) } else { before }
+    });
+    elements.exposed = exposed.collect();
 }
 
 /// Whether light that meets a side goes nowhere from there: it is sealed, or the inside of something.

@@ -4,6 +4,7 @@ use crate::Rgb;
 use crate::calibrate::calibrate;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::{LightField, NodeId, Transfer};
+use crate::kept_weights::KeptWeights;
 use crate::leaf_rows::balance;
 use crate::links::{Link, Links};
 use crate::push::{self, Push, Spread, visible};
@@ -86,10 +87,10 @@ impl Gather {
         light: Light<'_, L>,
         links: &Links,
         error: Option<f32>,
-        room: u64,
+        (room, known): (u64, Option<&KeptWeights>),
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
-        let push = Push::new(light, links, error, room, watch);
+        let push = Push::new(light, links, error, (room, known), watch);
         let emitted = light.emitted_power();
         let group = |(link, spread): (&Link, &Spread)| Group::of_link(light, &emitted, link, *spread);
         let groups: Vec<Group> = links.all().par_iter().zip(&push.spreads).map(group).collect();
@@ -142,6 +143,16 @@ impl Gather {
             (self.push.leaves[index], sum)
         };
         (0..self.push.leaves.len()).into_par_iter().with_min_len(64).map(brought).collect()
+    }
+
+    /// See [`Push::grafted`].
+    pub(crate) fn grafted(&mut self) {
+        self.push.grafted();
+    }
+
+    /// See [`Push::looked_at`].
+    pub(crate) fn looked_at(&self, elements: &Elements, links: &Links, leaf: u32) -> Vec<(usize, f32)> {
+        self.push.looked_at(elements, links, leaf)
     }
 
     /// What links deliver: [`lit`](Self::lit).

@@ -8,6 +8,7 @@
 use crate::exposed::is_touched;
 use crate::geometry::{Domain, FACETS, Facet, Geometry};
 use crate::hooks::{FLAT_COSINE, Hierarchy, NodeId};
+use crate::moved::Moved;
 use crate::scene::{Light, LightKind};
 use crate::sealed::{Side, is_back, lit_sides};
 use crate::skips::Skips;
@@ -198,25 +199,11 @@ impl Elements {
     pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<Rgb>, skips: Skips) -> Self {
         let mut roots: Vec<Element> = Vec::new();
         let mut sealed = vec![[false; 2]; scene.surfaces().len()];
-        let idle = idle(scene, &extra);
-        let lit = if skips.sealed_sides { lit_sides(scene, &idle) } else { vec![[true; 2]; idle.len()] };
-        for (i, lit) in lit.into_iter().enumerate() {
-            if scene.is_twin(i as u32) {
-                continue;
-            }
-            // Black ones are there to be shown.
-            let lit = [lit[0] || idle[i], lit[1]];
-            let material = &scene.materials[scene.surface_materials[i] as usize];
+        for (i, sides) in sides(scene, &extra, skips).into_iter().enumerate() {
             let glossy = extra(scene.surface_materials[i]);
-            let front = patch(scene, i as u32, Kind::Front, Domain::WHOLE, glossy);
-            let back = material.two_sided && front.importance > 0.0;
-            if lit[0] {
-                roots.push(front);
-            }
-            if back && lit[1] {
-                roots.push(patch(scene, i as u32, Kind::Back, Domain::WHOLE, glossy));
-            }
-            sealed[i] = [!lit[0], back && !lit[1]];
+            let side = |(kind, _)| patch(scene, i as u32, kind, Domain::WHOLE, glossy);
+            roots.extend(SIDES.into_iter().zip(sides.shown).filter(|(_, shown)| *shown).map(side));
+            sealed[i] = sides.sealed;
         }
         // Fronts and backs in trees of their own: what a cluster faces is then known better.
         let (fronts, backs): (Vec<Element>, Vec<Element>) = roots.into_iter().partition(|e| e.kind == Kind::Front);
@@ -241,11 +228,23 @@ impl Elements {
         for node in 0..elements.nodes.len() {
             elements.add_facets(scene, node);
         }
-        let touched = |surface: u32| {
-            [2 * surface, 2 * surface + 1].map(|side| elements.has(side) && is_touched(scene, &elements, side))
-        };
-        elements.touched = (0..scene.surfaces().len() as u32).into_par_iter().with_min_len(64).map(touched).collect();
+        elements.touched = vec![[false; 2]; scene.surfaces().len()];
+        elements.find_touched(scene, |_| true);
         elements
+    }
+
+    /// Finds the touched sides anew, those of some surfaces.
+    pub(crate) fn find_touched(&mut self, scene: &SceneData, of: impl Fn(u32) -> bool + Sync) {
+        let elements = &*self;
+        let touched = |surface: u32| {
+            let is_touched = |side| elements.has(side) && is_touched(scene, elements, side);
+            if of(surface) {
+                [2 * surface, 2 * surface + 1].map(is_touched)
+            } else {
+                elements.touched[surface as usize]
+            }
+        };
+        self.touched = (0..scene.surfaces().len() as u32).into_par_iter().with_min_len(64).map(touched).collect();
     }
 
     /// Share of a leaf's area that light may reach: the rest lies below something that stands on it. The leaf's irradiance
@@ -290,34 +289,45 @@ impl Elements {
 
     /// Lays the tree out breadth first, and fills clusters bottom-up.
     fn flatten(&mut self, root: Tree) {
-        let mut queue = std::collections::VecDeque::from([(root, 0_u32)]);
-        let mut next = 1_u32;
-        while let Some((tree, parent)) = queue.pop_front() {
-            let id = self.nodes.len() as u32;
-            match tree {
+        self.nodes.push(EMPTY);
+        self.lay(root, 0, 0);
+        for id in (0..self.nodes.len()).rev() {
+            self.fill(id);
+        }
+    }
+
+    /// Lays a tree out breadth first: its root in a place that there is, below a parent, the rest at the end.
+    fn lay(&mut self, tree: Tree, parent: u32, at: u32) {
+        let mut queue = std::collections::VecDeque::from([(tree, parent, at)]);
+        while let Some((tree, parent, id)) = queue.pop_front() {
+            self.nodes[id as usize] = match tree {
                 Tree::Leaf(mut element) => {
                     element.parent = parent;
                     if element.is_patch() {
                         self.surface_nodes[element.source as usize][usize::from(element.kind == Kind::Back)] = id;
                     }
-                    self.nodes.push(element);
+                    element
                 }
                 Tree::Inner(children) => {
-                    self.nodes.push(Element { parent, first_child: next, child_count: children.len() as u32, ..EMPTY });
-                    next += children.len() as u32;
-                    queue.extend(children.into_iter().map(|child| (child, id)));
+                    let (first_child, child_count) = (self.nodes.len() as u32, children.len() as u32);
+                    self.nodes.resize(self.nodes.len() + children.len(), EMPTY);
+                    queue.extend(children.into_iter().zip(first_child..).map(|(child, at)| (child, id, at)));
+                    Element { parent, first_child, child_count, ..EMPTY }
                 }
-            }
+            };
         }
-        for id in (0..self.nodes.len()).rev() {
-            if self.nodes[id].kind == Kind::Cluster {
-                self.nodes[id] = self.cluster(id);
-            }
+    }
+
+    /// Makes a cluster what its children are together.
+    fn fill(&mut self, id: usize) {
+        if self.nodes[id].kind == Kind::Cluster {
+            self.nodes[id] = self.cluster(id);
         }
     }
 
     fn cluster(&self, id: usize) -> Element {
-        let mut cluster = self.nodes[id];
+        let Element { parent, first_child, child_count, .. } = self.nodes[id];
+        let mut cluster = Element { parent, first_child, child_count, ..EMPTY };
         let range = cluster.first_child as usize..(cluster.first_child + cluster.child_count) as usize;
         let children = || self.nodes[range.clone()].iter().filter(|c| c.kind != Kind::Light);
         let mut normals: Option<Cone> = None;
@@ -343,6 +353,72 @@ impl Elements {
             cluster.radius = 0.5 * (high - low).length();
         }
         cluster
+    }
+
+    /// Takes other places over: those of surfaces and lights that have moved, with all parts and what holds them.
+    pub(crate) fn refit(&mut self, scene: &SceneData, moved: &Moved) {
+        for id in (0..self.nodes.len()).rev() {
+            let before = self.nodes[id];
+            let now = match before.kind {
+                _ if !moved.is_below(id as u32) => continue,
+                Kind::Cluster => self.cluster(id),
+                Kind::Light => light(scene, before.source),
+                Kind::Front | Kind::Back => patch(scene, before.source, before.kind, before.domain, None),
+            };
+            let Element { parent, first_child, child_count, active, reflectance, importance, facets, .. } = before;
+            if let Some(facets) = self.facets.get_mut(facets as usize) {
+                *facets = scene.surfaces()[before.source as usize].facets(before.domain);
+            }
+            let kept = Element { parent, first_child, child_count, active, facets, ..now };
+            self.nodes[id] = if before.is_patch() { Element { reflectance, importance, ..kept } } else { kept };
+        }
+    }
+
+    /// Takes note of the sides that no light can reach now. Returns elements for those that it can reach now and could not
+    /// before.
+    pub(crate) fn unseal(
+        &mut self,
+        scene: &SceneData,
+        extra: impl Fn(u32) -> Option<Rgb>,
+        skips: Skips,
+    ) -> Vec<Element> {
+        let mut found = Vec::new();
+        for (i, sides) in sides(scene, &extra, skips).into_iter().enumerate() {
+            let glossy = extra(scene.surface_materials[i]);
+            for ((kind, shown), node) in SIDES.into_iter().zip(sides.shown).zip(self.surface_nodes[i]) {
+                if shown && node == u32::MAX {
+                    found.push(patch(scene, i as u32, kind, Domain::WHOLE, glossy));
+                }
+            }
+            self.sealed[i] = sides.sealed;
+        }
+        found
+    }
+
+    /// Adds sides beside all that there is: below a new root are the old one and a tree of them. Nodes there are have other
+    /// ids then: see [`grafted`].
+    pub(crate) fn graft(&mut self, scene: &SceneData, sides: Vec<Element>) {
+        let Some(tree) = Tree::build(sides) else { return };
+        for element in &mut self.nodes {
+            element.parent = grafted(element.parent);
+            element.first_child = if element.child_count > 0 { grafted(element.first_child) } else { 0 };
+        }
+        self.nodes[0].parent = 0;
+        for node in self.surface_nodes.as_flattened_mut().iter_mut().filter(|node| **node != u32::MAX) {
+            *node = grafted(*node);
+        }
+        make_room(&mut self.nodes, || EMPTY);
+        make_room(&mut self.exposed, || 1.0);
+        self.nodes[0] = Element { first_child: 1, child_count: 2, ..EMPTY };
+        let first = self.nodes.len();
+        self.lay(tree, 0, GRAFT);
+        for id in (first..self.nodes.len()).rev().chain([GRAFT as usize, 0]) {
+            self.fill(id);
+            self.add_facets(scene, id);
+        }
+        for (surface, &twin) in scene.twins.iter().enumerate() {
+            self.surface_nodes[surface] = self.surface_nodes[twin as usize];
+        }
     }
 
     /// Finds all reflectances anew, those of surfaces from the scene.
@@ -448,6 +524,51 @@ const EMPTY: Element = Element {
     whole_sphere: false,
     convex: false,
 };
+
+/// The root of what [`Elements::graft`] adds.
+pub(crate) const GRAFT: u32 = 2;
+
+/// The id that a node has after [`Elements::graft`].
+pub(crate) const fn grafted(node: u32) -> u32 {
+    if node == 0 { 1 } else { node + GRAFT }
+}
+
+/// Makes room in an array by node for those that [`Elements::graft`] adds before others.
+pub(crate) fn make_room<T>(array: &mut Vec<T>, empty: impl Fn() -> T) {
+    if !array.is_empty() {
+        array.insert(0, empty());
+        array.insert(GRAFT as usize, empty());
+    }
+}
+
+const SIDES: [Kind; 2] = [Kind::Front, Kind::Back];
+
+/// What becomes of the front and the back of a surface.
+#[derive(Clone, Copy, Default)]
+struct Sides {
+    /// Whether it has an element.
+    shown: [bool; 2],
+    /// Whether it has none because no light can reach it, which it would reflect.
+    sealed: [bool; 2],
+}
+
+/// What becomes of the sides of all surfaces.
+fn sides(scene: &SceneData, extra: &impl Fn(u32) -> Option<Rgb>, skips: Skips) -> Vec<Sides> {
+    let idle = idle(scene, extra);
+    let lit = if skips.sealed_sides { lit_sides(scene, &idle) } else { vec![[true; 2]; idle.len()] };
+    let of_surface = |(i, [front, back]): (usize, [bool; 2])| {
+        if scene.is_twin(i as u32) {
+            return Sides::default();
+        }
+        // Black ones are there to be shown.
+        let front = front || idle[i];
+        let material = scene.surface_materials[i];
+        let reflects = || scene.reflectance(i as u32, &Domain::WHOLE) + extra(material).unwrap_or(Rgb::ZERO);
+        let has_back = scene.materials[material as usize].two_sided && reflects().max_element() > 0.0;
+        Sides { shown: [front, has_back && back], sealed: [!front, has_back && !back] }
+    };
+    lit.into_iter().enumerate().map(of_surface).collect()
+}
 
 /// For each surface whether it does nothing with light but hide it: it is black, or coincides with another one.
 fn idle(scene: &SceneData, extra: &impl Fn(u32) -> Option<Rgb>) -> Vec<bool> {

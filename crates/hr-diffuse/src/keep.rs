@@ -1,5 +1,5 @@
-//! Solutions to be kept: as flat arrays, and from them again. Geometry is not among them: it comes from the scene, and
-//! whoever restores a solution sees to it that it is the same one.
+//! Solutions to be kept: as flat arrays, and from them again. Geometry is not among them, only the tree over it: it comes from
+//! the scene, and whoever restores a solution sees to it that it is the same one.
 //!
 //! What is read is checked as if it came from an enemy: all indices lie within what they point into, the hierarchy is a
 //! tree, all light is finite.
@@ -14,10 +14,11 @@ use crate::refine::Pair;
 use crate::reflect::Senders;
 use crate::resume::Unfinished;
 use crate::solution::Solution;
-use crate::solver::scene_data;
-use crate::stats::{Seconds, Skipped, Stats};
+use crate::solver::scene_by;
+use crate::stats::{Skipped, Stats};
 use crate::transport::Exitant;
-use crate::{Rgb, SceneInput, SolveError};
+use crate::visibility::Visibility;
+use crate::{Normalization, Rgb, SceneInput, SolveError};
 use std::io;
 use std::time::Instant;
 
@@ -67,6 +68,10 @@ impl<L: Keep> Solution<L> {
     /// # Errors
     /// Those of what is written to.
     pub fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+        // Things may have moved since it was made.
+        out.put(&self.scene.normalization.to_array())?;
+        out.put(&self.scene.twins)?;
+        self.scene.visibility.store(out)?;
         self.stats.store(out)?;
         self.elements.store(out)?;
         self.exitant.store(out)?;
@@ -84,7 +89,15 @@ impl<L: Keep> Solution<L> {
     /// Where the scene cannot be used, or the arrays are not those of a solution of a scene like this.
     pub fn restore(input: &SceneInput, field: L, from: &mut Reader<'_>) -> Result<Self, RestoreError> {
         let start = Instant::now();
-        let scene = scene_data(input)?;
+        const SPACE: &str = "unit space";
+        let normalization = Normalization::from_array(from.take_exactly(SPACE)?).ok_or(FlatError::Misfit(SPACE))?;
+        let scene = scene_by(input, normalization, |surfaces, _| {
+            let twins: Vec<u32> = from.take("coinciding surfaces")?;
+            let is_sound = |(surface, &twin): (usize, &u32)| twin as usize <= surface && twins[twin as usize] == twin;
+            let fit = twins.len() == surfaces.len() && twins.iter().enumerate().all(is_sound);
+            fits(fit, "coinciding surfaces")?;
+            Ok::<_, RestoreError>((Visibility::restore(surfaces, &twins, from)?, twins))
+        })?;
         let mut stats = Stats::restore(from)?;
         let elements = Elements::restore(&scene, from)?;
         let count = elements.nodes.len();
@@ -302,7 +315,8 @@ impl Vertices {
 }
 
 impl Stats {
-    fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+    /// All counters, in the order in which they are kept.
+    fn counters(&mut self) -> [&mut u64; 21] {
         let Self {
             polygons,
             nodes,
@@ -312,17 +326,19 @@ impl Stats {
             check_rays,
             vertex_rays,
             pairs,
-            iterations,
+            renewed_links,
+            kept_links,
+            iterations: _,
             links_evaluated,
-            ref residuals,
-            error,
-            bias,
-            stopped,
-            spent,
+            residuals: _,
+            error: _,
+            bias: _,
+            stopped: _,
+            spent: _,
             bytes,
             skipped,
             seconds: _,
-        } = *self;
+        } = self;
         let Skipped {
             black_receivers,
             unlit_senders,
@@ -334,91 +350,62 @@ impl Stats {
             faint_links,
             shot_links,
         } = skipped;
-        let spent = match spent {
+        [
+            polygons,
+            nodes,
+            leaves,
+            links,
+            rays,
+            check_rays,
+            vertex_rays,
+            pairs,
+            renewed_links,
+            kept_links,
+            links_evaluated,
+            bytes,
+            black_receivers,
+            unlit_senders,
+            facing,
+            proved_free,
+            proved_blocked,
+            sealed_sides,
+            converged_leaves,
+            faint_links,
+            shot_links,
+        ]
+    }
+
+    fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
+        let spent = match self.spent {
             None => 0_u64,
             Some(Spent::Time) => 1,
             Some(Spent::Memory) => 2,
         };
-        out.put(&[
-            polygons,
-            nodes,
-            leaves,
-            links,
-            rays,
-            check_rays,
-            vertex_rays,
-            pairs,
-            iterations.into(),
-            links_evaluated,
-            bytes,
-        ])?;
-        out.put(&[stopped.into(), spent])?;
-        out.put(&[
-            black_receivers,
-            unlit_senders,
-            facing,
-            proved_free,
-            proved_blocked,
-            sealed_sides,
-            converged_leaves,
-            faint_links,
-            shot_links,
-        ])?;
-        out.put(residuals)?;
-        out.put(error.as_slice())?;
-        out.put(&[bias])
+        out.put(&self.clone().counters().map(|counter| *counter))?;
+        out.put(&[self.iterations.into(), self.stopped.into(), spent])?;
+        out.put(&self.residuals)?;
+        out.put(self.error.as_slice())?;
+        out.put(&[self.bias])
     }
 
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
-        let [polygons, nodes, leaves, links, rays, check_rays, vertex_rays, pairs, iterations, links_evaluated, bytes] =
-            from.take_exactly(WHAT)?;
-        let [stopped, spent] = from.take_exactly::<u64, 2>(WHAT)?;
-        let [
-            black_receivers,
-            unlit_senders,
-            facing,
-            proved_free,
-            proved_blocked,
-            sealed_sides,
-            converged_leaves,
-            faint_links,
-            shot_links,
-        ] = from.take_exactly(WHAT)?;
-        Ok(Self {
-            polygons,
-            nodes,
-            leaves,
-            links,
-            rays,
-            check_rays,
-            vertex_rays,
-            pairs,
-            links_evaluated,
-            iterations: u64::try_into(iterations).map_err(|_| FlatError::Misfit(WHAT))?,
-            residuals: from.take(WHAT)?,
-            error: from.take_finite(WHAT)?.first().copied(),
-            bias: from.take_exactly::<f32, 1>(WHAT)?[0],
-            stopped: stopped != 0,
-            spent: match spent {
-                0 => None,
-                1 => Some(Spent::Time),
-                2 => Some(Spent::Memory),
-                _ => return Err(FlatError::Misfit(WHAT)),
-            },
-            bytes,
-            skipped: Skipped {
-                black_receivers,
-                unlit_senders,
-                facing,
-                proved_free,
-                proved_blocked,
-                sealed_sides,
-                converged_leaves,
-                faint_links,
-                shot_links,
-            },
-            seconds: Seconds::default(),
-        })
+        let mut stats = Self::default();
+        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 21>(WHAT)?) {
+            *counter = kept;
+        }
+        let [iterations, stopped, spent] = from.take_exactly::<u64, 3>(WHAT)?;
+        stats.iterations = iterations.try_into().map_err(|_| FlatError::Misfit(WHAT))?;
+        stats.stopped = stopped != 0;
+        stats.spent = match spent {
+            0 => None,
+            1 => Some(Spent::Time),
+            2 => Some(Spent::Memory),
+            _ => return Err(FlatError::Misfit(WHAT)),
+        };
+        stats.residuals = from.take(WHAT)?;
+        stats.error = from.take_finite(WHAT)?.first().copied();
+        [stats.bias] = from.take_exactly(WHAT)?;
+        Ok(stats)
     }
 }

@@ -11,6 +11,15 @@ use smallvec::SmallVec;
 /// What is proved of all segments between points of two nodes that face each other. What of clusters hides the rest of them
 /// is not looked into: of these only that nothing is between can be proved, or that one surface hides all.
 pub(crate) fn prove(scene: &SceneData, receiver: &Element, sender: &Element) -> Proof {
+    // Surfaces that cannot hide their own points from what these face.
+    let own = |element: &Element| if element.is_patch() && element.convex { element.source } else { NO_BLOCKER };
+    let clusters = receiver.kind == Kind::Cluster || sender.kind == Kind::Cluster;
+    let most = if clusters { 0 } else { MOST_LISTED };
+    scene.visibility.prove(&shaft(scene, receiver, sender), [own(receiver), own(sender)], most)
+}
+
+/// All segments between points of two nodes that face each other, or a little more.
+pub(crate) fn shaft(scene: &SceneData, receiver: &Element, sender: &Element) -> Shaft {
     let target = end(scene, receiver);
     let source = match sender.kind {
         Kind::Light => match scene.lights[sender.source as usize].kind {
@@ -19,11 +28,7 @@ pub(crate) fn prove(scene: &SceneData, receiver: &Element, sender: &Element) -> 
         },
         _ => end(scene, sender),
     };
-    // Surfaces that cannot hide their own points from what these face.
-    let own = |element: &Element| if element.is_patch() && element.convex { element.source } else { NO_BLOCKER };
-    let clusters = receiver.kind == Kind::Cluster || sender.kind == Kind::Cluster;
-    let most = if clusters { 0 } else { MOST_LISTED };
-    scene.visibility.prove(&Shaft::new([target, source]), [own(receiver), own(sender)], most)
+    Shaft::new([target, source])
 }
 
 fn end(scene: &SceneData, element: &Element) -> End {

@@ -7,8 +7,9 @@
 
 use crate::NodeId;
 use crate::gather::{GROUPS, Group};
-use crate::hierarchy::{Element, Kind, SceneData};
+use crate::hierarchy::{Element, Elements, Kind, SceneData, grafted};
 use crate::hooks::{Hierarchy, LightField};
+use crate::kept_weights::{KeptWeights, take};
 use crate::links::{Link, Links};
 use crate::sampling::hash;
 use crate::segments::visibility;
@@ -85,13 +86,13 @@ pub(crate) struct Push {
 }
 
 impl Push {
-    /// Finds the weights of the leaves, for a solution with the given relative error; where there is none, and where `watch`
-    /// breaks, by orientation and distance alone. The weights that are kept take no more than `room` bytes.
+    /// Finds the weights of the leaves but for those `known`, for a solution with the given relative error; where there is none,
+    /// and where `watch` breaks, by orientation and distance alone. The weights that are kept take no more than `room` bytes.
     pub(crate) fn new<L: LightField>(
         light: Light<'_, L>,
         links: &Links,
         error: Option<f32>,
-        room: u64,
+        (room, known): (u64, Option<&KeptWeights>),
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
         let leaves: Vec<u32> = light.elements.patch_leaves().collect();
@@ -135,17 +136,23 @@ impl Push {
             rest = after;
         }
         let chunk = if error.is_some() { BETWEEN_WATCHES * threads::current_num_threads() } else { parts.len().max(1) };
-        let mut rays = 0;
+        let (mut rays, rough) = (0, known.is_some_and(|known| known.rough));
         for part in parts.chunks_mut(chunk) {
             if error.is_some() && watch().is_break() {
-                return Self::new(light, links, None, room, watch);
+                return Self::new(light, links, None, (room, None), watch);
             }
             let shot = part.par_iter_mut().with_min_len(4).map(|(leaf, weights)| {
                 let (mut slots, mut rays) = (weights.iter_mut(), 0);
+                let mut known = known.map_or_else(Vec::new, |it| it.of(light, *leaf)).into_iter().peekable();
                 push.each(light, links, *leaf, |place, at| {
                     if let Some(slot) = slots.next() {
-                        let known = (push.spreads[at], push.means[at]);
-                        let (weight, shot) = place.weight(light, &links.all()[at], known, rays);
+                        let (link, spread) = (&links.all()[at], push.spreads[at]);
+                        let stays = if spread == Spread::Exact { take(&mut known, link) } else { None };
+                        let find = || match rough {
+                            true => (place.plain(light, link, spread), 0),
+                            false => place.weight(light, link, (spread, push.means[at]), rays),
+                        };
+                        let (weight, shot) = stays.map_or_else(find, |weight| (weight, 0));
                         *slot = weight;
                         rays += shot;
                     }
@@ -157,6 +164,33 @@ impl Push {
         push.rays = rays;
         push.weights = weights;
         push
+    }
+
+    /// Leaves have the ids that they have after [`Elements::graft`].
+    pub(crate) fn grafted(&mut self) {
+        self.leaves.iter_mut().for_each(|leaf| *leaf = grafted(*leaf));
+    }
+
+    /// Weights of a leaf for links that were looked at closely, by place among `links`: from the leaf up to the root.
+    pub(crate) fn looked_at(&self, elements: &Elements, links: &Links, leaf: u32) -> Vec<(usize, f32)> {
+        let index = self.leaves.binary_search(&leaf).ok();
+        let Some(range) = index.and_then(|index| self.first.get(index..index + 2)) else { return Vec::new() };
+        let mut weights = self.weights[range[0]..range[1]].iter();
+        let (mut found, mut node) = (Vec::with_capacity(weights.len()), leaf);
+        loop {
+            for at in links.range(node) {
+                if self.spreads[at] != Spread::Even
+                    && let Some(&weight) = weights.next()
+                    && self.spreads[at] == Spread::Exact
+                {
+                    found.push((at, weight));
+                }
+            }
+            if node == 0 {
+                return found;
+            }
+            node = elements.nodes[node as usize].parent;
+        }
     }
 
     /// Bytes of the weights that are kept.

@@ -11,6 +11,7 @@ use crate::error::SolveError;
 use crate::hierarchy::Elements;
 use crate::hooks::LightField;
 use crate::solver::{Progress, Solver, check, unit_lights};
+use crate::stats::Stats;
 use crate::transport::Exitant;
 use crate::{Light, LightKind, Rgb, SceneInput};
 use std::ops::ControlFlow;
@@ -77,6 +78,12 @@ impl<L: LightField> Solver<L> {
         &self.exitant
     }
 
+    /// Work done and avoided so far.
+    #[must_use]
+    pub fn stats(&self) -> &Stats {
+        &self.stats
+    }
+
     /// What has links.
     pub(crate) fn linked(&self) -> Linked {
         let has = |(m, material): (usize, &crate::DiffuseMaterial)| {
@@ -101,7 +108,7 @@ impl<L: LightField> Solver<L> {
         field: Option<L>,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<(), SolveError> {
-        self.can_take(input, field.as_ref())?;
+        self.can_take(input, field.as_ref(), false)?;
         let lights = unit_lights(input, &self.scene.normalization)?;
         let before = (
             std::mem::replace(&mut self.scene.materials, input.materials.clone()),
@@ -247,8 +254,8 @@ impl<L: LightField> Solver<L> {
         self.stats.stopped = stopped;
     }
 
-    /// Whether a scene differs from this one by what links do not depend on.
-    fn can_take(&self, input: &SceneInput, field: Option<&L>) -> Result<(), SolveError> {
+    /// Whether a scene differs from this one by what links do not depend on, or also by where lights are where these may move.
+    pub(crate) fn can_take(&self, input: &SceneInput, field: Option<&L>, moves: bool) -> Result<(), SolveError> {
         check(input)?;
         let refused = |what, index| Err(SolveError::Edit { what, index });
         let surfaces: Vec<u32> = input.surfaces.iter().map(|surface| surface.material).collect();
@@ -279,7 +286,7 @@ impl<L: LightField> Solver<L> {
             return refused("lights were added or removed, first of all light", 0);
         }
         for (l, (new, old)) in input.lights.iter().zip(&self.scene.lights).enumerate() {
-            if !is_same(new, old) {
+            if !moves && !is_same(new, old) {
                 return refused("it has another place, direction or cone now: light", l);
             }
             if !self.linked.lights[l] && new.intensity != Rgb::ZERO {

@@ -31,7 +31,7 @@ const FINEST: f32 = 0.25;
 pub(crate) struct Unfinished {
     /// Tolerance that the links there are were made for; infinite before the first pass is done.
     pub(crate) tolerance: f32,
-    /// The relative error that was found then; infinite where nobody has looked.
+    /// The relative error that was found then; infinite where nobody has looked since links were made or things moved.
     pub(crate) found: f32,
     /// Pairs without a link, whose sender was dark.
     pub(crate) unlit: Vec<Pair>,
@@ -47,16 +47,15 @@ impl Unfinished {
 
     /// The tolerance of the next pass toward a relative error; `None` where nothing is left to be done.
     pub(crate) fn next(&self, error: f32) -> Option<f32> {
-        let firsts = first_tolerances(error);
-        if let Some(&tolerance) = firsts.iter().find(|&&tolerance| tolerance < self.tolerance)
-            && self.found.is_infinite()
-        {
-            return Some(tolerance);
+        if self.found.is_infinite() {
+            // Links of the last of the first passes, or finer ones, are looked at once more.
+            let firsts = first_tolerances(error);
+            let next = firsts.iter().find(|&&tolerance| tolerance < self.tolerance);
+            return Some(next.copied().unwrap_or(self.tolerance));
         }
         let done = self.found <= ACCEPTED * error || self.tolerance <= FINEST * error;
         // Whole halves, so that what rays happen to find seldom makes another solution.
         let halves = (2.0 * (self.found / (AIM * error)).log2()).round().clamp(1.0, MOST_HALVES);
-        let halves = if self.found.is_finite() { halves } else { 1.0 };
         (!done).then(|| (self.tolerance * (-halves).exp2()).max(FINEST * error))
     }
 

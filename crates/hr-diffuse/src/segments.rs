@@ -17,8 +17,9 @@ const NEAR_LEVELS: u32 = 4;
 /// Radiosities that differ by no more than this share are taken to be the same.
 const EVENLY: f32 = 0.1;
 
-/// How far away distant light is taken to come from: unit space is the unit cube, so that this is outside.
-pub(crate) const DISTANT: f32 = 2.0;
+/// How far away distant light is taken to come from: outside of unit space and half as much around it, from
+/// wherever in there.
+pub(crate) const DISTANT: f32 = 4.0;
 
 /// A point on a surface below a node.
 #[derive(Clone, Copy, Debug)]

@@ -9,6 +9,7 @@ use crate::gather::Gather;
 use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
+use crate::kept_weights::KeptWeights;
 use crate::links::Links;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
@@ -19,6 +20,7 @@ use crate::shooting::Shot;
 use crate::skips::Skips;
 use crate::stats::Stats;
 use crate::steady;
+use crate::threads::prelude::*;
 use crate::transport::{Exitant, Light};
 use crate::twins::twins;
 use crate::visibility::Visibility;
@@ -143,7 +145,9 @@ pub struct Solver<L: LightField = ()> {
     /// What arrives through the links there are.
     pub(crate) gather: Gather,
     /// Whether it is known for these links as well as it can be.
-    prepared: bool,
+    pub(crate) prepared: bool,
+    /// What of it stays known for the next links.
+    pub(crate) kept_weights: Option<KeptWeights>,
     /// What has links.
     pub(crate) linked: Linked,
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
@@ -230,6 +234,7 @@ impl<L: LightField> Solver<L> {
             unfinished: Unfinished::new(Vec::new()),
             gather: Gather::default(),
             prepared: false,
+            kept_weights: None,
             linked: Linked::default(),
             faint,
             strong,
@@ -309,6 +314,30 @@ impl<L: LightField> Solver<L> {
             *stopped = *stopped || watch(&progress).is_break();
             if *stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
+    }
+
+    /// Solves on where pairs have come to wait that had links: first those get links again, as fine as all others, and light
+    /// settles roughly over them.
+    pub(crate) fn solve_again(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        self.area = self.elements.nodes[0].area.max(f32::MIN_POSITIVE);
+        self.stats.spent = None;
+        self.stats.residuals.clear();
+        self.restart();
+        self.pull();
+        let (mut stopped, tolerance) = (false, self.unfinished.tolerance);
+        if tolerance.is_finite() {
+            let (reflects, _) = is_worth(tolerance, self.settings.error);
+            let pass = Pass { number: 0, tolerance, reflects, closely: false };
+            let kept = self.links.take();
+            self.refine(pass, &mut stopped, watch);
+            self.links = Links::new([kept, self.links.take()].concat(), self.elements.nodes.len());
+            if !stopped {
+                let known = self.kept_weights.as_mut().map(|known| known.rough = true);
+                self.prepare_watched(Pass { closely: known.is_some(), ..pass }, &mut stopped, watch);
+                self.settle(pass, &mut stopped, watch);
+            }
+        }
+        self.solve(&mut |progress| if stopped { ControlFlow::Break(()) } else { watch(progress) });
     }
 
     /// Lets light settle anew over the links that there are, for which it is found out how they reach leaves where it is not
@@ -545,7 +574,10 @@ impl<L: LightField> Solver<L> {
         let start = Instant::now();
         let error = tolerance.map(|tolerance| if self.skips.faint_links { tolerance } else { 0.0 });
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
-        self.gather = Gather::new(self.light(), &self.links, error, room, watch);
+        let known = tolerance.and_then(|_| self.kept_weights.take());
+        let known = known.map(|known| known.with_light(&self.elements, &self.exitant, self.settings.error));
+        self.gather = Gather::new(self.light(), &self.links, error, (room, known.as_ref()), watch);
+        self.kept_weights = known.and_then(KeptWeights::once_more);
         self.prepared = tolerance.is_some();
         self.stats.rays += self.gather.rays();
         self.stats.skipped.faint_links = self.gather.faint_links();
@@ -760,21 +792,35 @@ pub(crate) fn check(input: &SceneInput) -> Result<(), SolveError> {
 
 /// Checks a scene and maps it to unit space.
 pub(crate) fn scene_data(input: &SceneInput) -> Result<SceneData, SolveError> {
+    scene_in(input, Normalization::new(&input.surfaces))
+}
+
+/// Checks a scene and maps it to a unit space that there is.
+pub(crate) fn scene_in(input: &SceneInput, normalization: Normalization) -> Result<SceneData, SolveError> {
+    scene_by(input, normalization, |surfaces, materials| {
+        let twins = twins(&surfaces, materials);
+        Ok((Visibility::with_twins(&surfaces, &twins), twins))
+    })
+}
+
+/// Checks a scene and maps it to a unit space that there is; a closure makes of surfaces and materials what answers rays, and
+/// tells which surfaces coincide.
+pub(crate) fn scene_by<E: From<SolveError>>(
+    input: &SceneInput,
+    normalization: Normalization,
+    rays: impl FnOnce(Vec<Geometry>, &[u32]) -> Result<(Visibility, Vec<u32>), E>,
+) -> Result<SceneData, E> {
     check(input)?;
-    let normalization = Normalization::new(&input.surfaces);
-    let surfaces = input
-        .surfaces
-        .iter()
-        .enumerate()
-        .map(|(surface, s)| {
-            Geometry::from_surface(s, &normalization).map_err(|source| SolveError::Surface { surface, source })
-        })
-        .collect::<Result<Vec<_>, _>>()?;
+    let all = input.surfaces.par_iter().with_min_len(256).enumerate().map(|(surface, s)| {
+        Geometry::from_surface(s, &normalization).map_err(|source| SolveError::Surface { surface, source })
+    });
+    // The first error of all, whichever thread finds one first.
+    let surfaces = all.collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()?;
     let lights = unit_lights(input, &normalization)?;
     let surface_materials: Vec<u32> = input.surfaces.iter().map(|s| s.material).collect();
-    let twins = twins(&surfaces, &surface_materials);
+    let (visibility, twins) = rays(surfaces, &surface_materials)?;
     Ok(SceneData {
-        visibility: Visibility::with_twins(&surfaces, &twins),
+        visibility,
         surface_materials,
         twins,
         shading_normals: input.surfaces.iter().map(|s| s.shading_normals).collect(),

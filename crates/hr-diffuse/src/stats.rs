@@ -22,6 +22,10 @@ pub struct Stats {
     pub vertex_rays: u64,
     /// Pairs of elements that the oracle looked at.
     pub pairs: u64,
+    /// Of the last edit of places: links that it concerned, which were made anew, …
+    pub renewed_links: u64,
+    /// … and those that stayed.
+    pub kept_links: u64,
     /// Iterations (gather, push, reflect, pull).
     pub iterations: u32,
     /// Links that light was sent over, each counted in every iteration that did so.

@@ -54,7 +54,8 @@ pub struct Hit {
 }
 
 /// Four boxes side by side: lows and highs of x, y, z alternating, so that a direction's sign picks near and far.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 struct Node {
     bounds: [Vec4; 6],
     /// Index of a node, or [`LEAF`] | index of a leaf.
@@ -70,7 +71,8 @@ impl Node {
 }
 
 /// A run of primitives.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 struct Leaf {
     first: u32,
     count: u32,
@@ -81,6 +83,16 @@ struct Leaf {
 enum Primitive {
     Polygon(Outline),
     Curved,
+}
+
+impl Primitive {
+    fn of(geometry: &Geometry) -> Self {
+        match geometry {
+            Geometry::Triangle(triangle) => Self::Polygon(triangle.outline()),
+            Geometry::Quad(quad) => Self::Polygon(quad.outline()),
+            Geometry::Revolution(_) => Self::Curved,
+        }
+    }
 }
 
 /// Part of space: a box, between two heights along a unit normal.
@@ -460,11 +472,7 @@ impl Visibility {
         for &surface in groups.flatten() {
             self.primitive_of[surface as usize] = self.primitives.len() as u32;
             self.surfaces.push(surface);
-            self.primitives.push(match &self.geometries[surface as usize] {
-                Geometry::Triangle(triangle) => Primitive::Polygon(triangle.outline()),
-                Geometry::Quad(quad) => Primitive::Polygon(quad.outline()),
-                Geometry::Revolution(_) => Primitive::Curved,
-            });
+            self.primitives.push(Primitive::of(&self.geometries[surface as usize]));
         }
         self.leaves.push(Leaf { first, count: self.primitives.len() as u32 - first });
         self.leaves.len() as u32 - 1
@@ -535,6 +543,7 @@ impl Groups {
     }
 }
 
+mod keep;
 mod shaft;
 #[cfg(test)]
 mod tests;

@@ -26,11 +26,11 @@ struct Print(Xxh3);
 
 impl Print {
     fn counts<const N: usize>(&mut self, counts: [usize; N]) {
-        counts.into_iter().for_each(|count| self.0.update(&(count as u64).to_le_bytes()));
+        self.0.update(counts.map(|count| (count as u64).to_le_bytes()).as_flattened());
     }
 
     fn numbers<const N: usize>(&mut self, numbers: [f64; N]) {
-        numbers.into_iter().for_each(|number| self.0.update(&number.to_le_bytes()));
+        self.0.update(numbers.map(f64::to_le_bytes).as_flattened());
     }
 
     fn points(&mut self, points: &[DVec3]) {

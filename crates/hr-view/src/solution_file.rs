@@ -22,7 +22,7 @@ use xxhash_rust::xxh3::Xxh3;
 const MAGIC: u64 = u64::from_le_bytes(*b"hr-light");
 
 /// Counts up with every change of what the arrays are or mean.
-const VERSION: u64 = 3;
+const VERSION: u64 = 4;
 
 /// Why a solution cannot be loaded.
 #[derive(Debug, thiserror::Error)]
@@ -165,14 +165,14 @@ pub fn load(path: &Path, scene: Arc<Scene>) -> Result<(Solved, Accuracy), Soluti
         sum.update(bytemuck::cast_slice(body));
         head.sealed(sum).checksum == head.checksum
     };
-    let (is_whole, restored) =
-        rayon::join(is_whole, || (head.scene == scene.fingerprint()).then(|| restore(&scene, &mut Reader::new(body))));
+    let checks = || rayon::join(is_whole, || head.scene == scene.fingerprint());
+    let (restored, (is_whole, is_its_own)) = rayon::join(|| restore(&scene, &mut Reader::new(body)), checks);
     if !is_whole {
         return Err(SolutionError::Checksum { path: at() });
     }
-    let Some(restored) = restored else {
+    if !is_its_own {
         return Err(SolutionError::OtherScene { path: at(), scene: scene.name.clone() });
-    };
+    }
     let (solution, accuracy) = restored.map_err(|source| SolutionError::Content { path: at(), source })?;
     Ok((Solved { scene, solution }, accuracy))
 }

@@ -42,6 +42,17 @@ impl Normalization {
         Self { offset: min, scale: if scale.is_finite() && scale > 0.0 { scale } else { 1.0 } }
     }
 
+    /// Shift and scale, to be kept.
+    pub(crate) fn to_array(self) -> [f64; 4] {
+        [self.offset.x, self.offset.y, self.offset.z, self.scale]
+    }
+
+    /// From what [`to_array`](Self::to_array) tells; `None` where that is no such map.
+    pub(crate) fn from_array([x, y, z, scale]: [f64; 4]) -> Option<Self> {
+        let offset = DVec3::new(x, y, z);
+        (offset.is_finite() && scale.is_finite() && scale > 0.0).then_some(Self { offset, scale })
+    }
+
     /// A scene position in unit space.
     #[must_use]
     pub fn to_unit(&self, position: DVec3) -> Vec3 {

@@ -17,7 +17,7 @@ fn link_share(link: &Link, spread: Spread) -> f32 {
 fn weights_are_means_over_the_receiver() {
     let solver = solve(&room(), 0.3 * ERROR, (), Skips::ALL);
     let (light, links) = (solver.light(), &solver.links);
-    let push = Push::new(light, links, Some(ERROR), u64::MAX, &mut || ControlFlow::Continue(()));
+    let push = Push::new(light, links, Some(ERROR), (u64::MAX, None), &mut || ControlFlow::Continue(()));
     // By link: weight × area of the leaves below, and their area.
     let mut below = vec![[0.0_f64; 2]; links.all().len()];
     for (index, &leaf) in push.leaves.iter().enumerate() {
@@ -51,7 +51,7 @@ fn weights_are_means_over_the_receiver() {
 fn weights_that_are_not_kept_are_found_again() {
     let solver = solve(&room(), ERROR, (), Skips::ALL);
     let (light, links) = (solver.light(), &solver.links);
-    let of = |room: u64| Push::new(light, links, Some(ERROR), room, &mut || ControlFlow::Continue(()));
+    let of = |room: u64| Push::new(light, links, Some(ERROR), (room, None), &mut || ControlFlow::Continue(()));
     let (all, none) = (of(u64::MAX), of(0));
     assert_eq!((none.weight_bytes(), all.weight_bytes() > 10_000), (0, true), "bytes that are kept");
     let groups = vec![Group::Rest; links.all().len()];
@@ -74,7 +74,7 @@ fn links_that_look_blocked_lose_nothing() {
     let solver = solve(&room(), ERROR, (), Skips::ALL);
     let light = solver.light();
     let watch = &mut || ControlFlow::Continue(());
-    let spreads = Push::new(light, &solver.links, Some(FINE), 0, watch).spreads;
+    let spreads = Push::new(light, &solver.links, Some(FINE), (0, None), watch).spreads;
     // Links that still matter with the least that is taken to be visible.
     let blocked = |(link, spread): (&Link, &Spread)| {
         let partial = link.visibility > 0.1 && link.visibility < 1.0;
@@ -91,7 +91,7 @@ fn links_that_look_blocked_lose_nothing() {
     let brought = |visibility: fn(f32) -> f32| {
         let links = chosen.iter().map(|link| Link { visibility: visibility(link.visibility), ..*link }).collect();
         let links = Links::new(links, nodes);
-        let push = Push::new(light, &links, Some(FINE), u64::MAX, &mut || ControlFlow::Continue(()));
+        let push = Push::new(light, &links, Some(FINE), (u64::MAX, None), &mut || ControlFlow::Continue(()));
         let carries = |(link, spread): (&Link, &Spread)| {
             light.emitted(link.sender, Vec3::Z).element_sum() * link_share(link, *spread)
         };

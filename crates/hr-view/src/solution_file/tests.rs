@@ -125,11 +125,12 @@ fn other_files_and_scenes_are_told_apart() {
     let text = error(&file, &scene("room")).to_string();
     assert!(text.contains("another scene than room") && text.contains("others"), "'{text}' names both");
     let mut newer = file.bytes();
-    newer[8] = 4;
+    newer[8] = VERSION as u8 + 1;
     seal(&mut newer);
     file.write(&newer);
     let text = error(&file, &solved.scene).to_string();
-    assert!(text.contains("version 4") && text.contains("version 3"), "'{text}' names both versions");
+    let [other, ours] = [VERSION + 1, VERSION].map(|version| format!("version {version}"));
+    assert!(text.contains(&other) && text.contains(&ours), "'{text}' names both versions");
     for foreign in [&b""[..], b"PF\n24 16\n-1.0\n", &[0; 4096]] {
         file.write(foreign);
         assert!(matches!(error(&file, &solved.scene), SolutionError::Foreign { .. }), "{} bytes", foreign.len());

@@ -1,10 +1,8 @@
 //! Shooting gives what gathering gives, and sends less light around.
 
+use crate::fixtures::{apart, bulb, ceiling_lamp, lamp, on, paint, sides, walls};
 use glam::DVec3;
-use hr_diffuse::{
-    DiffuseMaterial, Light, LightKind, Rgb, SceneInput, Settings, Shape, Solution, Solver, Surface, Transport,
-};
-use std::ops::ControlFlow;
+use hr_diffuse::{Rgb, SceneInput, Settings, Shape, Solution, Solver, Surface, Transport};
 
 /// The error that is asked for.
 const ERROR: f32 = 0.1;
@@ -12,57 +10,25 @@ const ERROR: f32 = 0.1;
 /// of transport errs by no more.
 const APART: f32 = 0.03 * ERROR;
 
-fn quad(corner: DVec3, a: DVec3, b: DVec3, material: u32) -> Surface {
-    Surface::new(Shape::Quad([corner, corner + a, corner + a + b, corner + b]), material)
-}
-
-/// A closed room of 4 × 3 × 2.5 m with a sphere, a lamp and a point light, of the reflectances given.
+/// A closed room with a sphere, a lamp and a point light, of the reflectances given.
 fn room(white: f32, grey: f32) -> SceneInput {
-    let (x, y, z) = (DVec3::X * 4.0, DVec3::Y * 3.0, DVec3::Z * 2.5);
-    let o = DVec3::ZERO;
-    let paint = |reflectance, exitance| DiffuseMaterial { reflectance, exitance, two_sided: false };
-    SceneInput {
-        surfaces: vec![
-            quad(o, x, y, 1),
-            quad(o + z, y, x, 0),
-            quad(o, y, z, 0),
-            quad(x, z, y, 0),
-            quad(o, z, x, 0),
-            quad(y, x, z, 0),
-            Surface::new(Shape::Sphere { center: DVec3::new(2.5, 1.0, 0.8), radius: 0.5 }, 1),
-            quad(DVec3::new(0.5, 0.5, 2.45), DVec3::Y * 0.4, DVec3::X * 0.4, 2),
-        ],
-        materials: vec![
-            paint(Rgb::new(1.0, 0.9, 0.8) * white, Rgb::ZERO),
-            paint(Rgb::new(0.5, 0.7, 1.0) * grey, Rgb::ZERO),
-            paint(Rgb::ZERO, Rgb::new(100.0, 80.0, 60.0)),
-        ],
-        lights: vec![Light { position: DVec3::new(2.0, 2.5, 1.5), intensity: Rgb::splat(3.0), kind: LightKind::Point }],
-        texture: None,
-    }
+    let mut surfaces = walls(1, 0, 0);
+    surfaces.push(Surface::new(Shape::Sphere { center: DVec3::new(2.5, 1.0, 0.8), radius: 0.5 }, 1));
+    surfaces.push(ceiling_lamp(2));
+    let materials = vec![
+        paint(Rgb::new(1.0, 0.9, 0.8) * white),
+        paint(Rgb::new(0.5, 0.7, 1.0) * grey),
+        lamp(Rgb::new(100.0, 80.0, 60.0)),
+    ];
+    SceneInput { surfaces, materials, lights: vec![bulb()], texture: None }
 }
 
 fn solver(input: &SceneInput, transport: Transport) -> Solver {
-    let settings = Settings { transport, ..Settings::with_error(ERROR) };
-    let mut solver = Solver::new(input, settings, ()).expect("the room is sound");
-    solver.solve(&mut |_| ControlFlow::Continue(()));
-    solver
+    crate::fixtures::solved(input, Settings { transport, ..Settings::with_error(ERROR) })
 }
 
 fn solve(input: &SceneInput, transport: Transport) -> Solution {
-    solver(input, transport).finish(&mut |_| ControlFlow::Continue(()))
-}
-
-/// Mean irradiance of the sides of all surfaces.
-fn sides(solver: &Solver) -> Vec<Rgb> {
-    let nodes = solver.elements().surface_nodes.iter().flatten().filter(|&&node| node != u32::MAX);
-    nodes.map(|&node| solver.exitant().irradiance[node as usize]).collect()
-}
-
-/// Largest difference, relative to what `b` has.
-fn apart(a: &[Rgb], b: &[Rgb]) -> f32 {
-    assert_eq!(a.len(), b.len(), "the same sides");
-    a.iter().zip(b).map(|(a, b)| ((*a - *b).abs() / b.max(Rgb::splat(1e-6))).max_element()).fold(0.0, f32::max)
+    solver(input, transport).finish(&mut on)
 }
 
 /// In the white room light settles slowly: little changes from one iteration to the next, but much adds up.
@@ -131,7 +97,7 @@ fn edits_shoot_anew() {
     edited.materials[2].exitance *= Rgb::new(1e-4, 0.5, 1.0);
     let settled = [Transport::Gather, Transport::Shoot].map(|transport| {
         let mut solver = solver(&input, transport);
-        solver.relight(&edited, None, &mut |_| ControlFlow::Continue(())).expect("light and paint");
+        solver.relight(&edited, None, &mut on).expect("light and paint");
         sides(&solver)
     });
     let off = apart(&settled[1], &settled[0]);

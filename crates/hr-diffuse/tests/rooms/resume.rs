@@ -1,36 +1,23 @@
 //! A solve that goes on after a stop ends at the answer of one that was not stopped.
 
+use crate::fixtures::{lamp, on, paint, quad, stored, table, walls};
 use glam::DVec3;
-use hr_diffuse::flat::{Reader, Writer};
-use hr_diffuse::{Budget, DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solution, SolveError, Solver, Surface};
+use hr_diffuse::flat::Reader;
+use hr_diffuse::{Budget, Rgb, SceneInput, Settings, Shape, Solution, SolveError, Solver, Surface};
 use std::ops::ControlFlow;
 
 /// The error that is asked for.
 const ERROR: f32 = 0.02;
 
-fn quad(corner: DVec3, a: DVec3, b: DVec3, material: u32) -> Surface {
-    Surface::new(Shape::Quad([corner, corner + a, corner + a + b, corner + b]), material)
-}
-
 /// A room with a table and a ball, and a lamp that shines at the ceiling: all else is dark at first.
 fn room() -> SceneInput {
-    let (x, y, z) = (DVec3::X * 4.0, DVec3::Y * 3.0, DVec3::Z * 2.5);
-    let o = DVec3::ZERO;
     let ball = Shape::Sphere { center: DVec3::new(3.0, 2.0, 0.5), radius: 0.4 };
-    let surfaces = vec![
-        quad(o, x, y, 1),
-        quad(o + z, y, x, 0),
-        quad(o, y, z, 0),
-        quad(x, z, y, 0),
-        quad(o, z, x, 1),
-        quad(y, x, z, 0),
-        quad(DVec3::new(1.0, 1.0, 0.8), DVec3::X * 1.5, DVec3::Y * 0.8, 1),
-        Surface::new(ball, 0),
-        quad(DVec3::new(0.5, 0.5, 1.8), DVec3::X * 0.4, DVec3::Y * 0.4, 2),
-    ];
-    let paint = |r| DiffuseMaterial { reflectance: Rgb::splat(r), exitance: Rgb::ZERO, two_sided: true };
-    let lamp = DiffuseMaterial { reflectance: Rgb::ZERO, exitance: Rgb::splat(100.0), two_sided: false };
-    SceneInput { surfaces, materials: vec![paint(0.7), paint(0.4), lamp], ..SceneInput::default() }
+    let mut surfaces = walls(1, 1, 0);
+    surfaces.push(table(1));
+    surfaces.push(Surface::new(ball, 0));
+    surfaces.push(quad(DVec3::new(0.5, 0.5, 1.8), DVec3::X * 0.4, DVec3::Y * 0.4, 2));
+    let materials = vec![paint(Rgb::splat(0.7)), paint(Rgb::splat(0.4)), lamp(Rgb::splat(100.0))];
+    SceneInput { surfaces, materials, ..SceneInput::default() }
 }
 
 /// Solves for an error, and breaks after so many calls of the closure.
@@ -40,7 +27,7 @@ fn finished(mut solver: Solver, calls: usize) -> Solution {
         left = left.saturating_sub(1);
         if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
-    solver.finish(&mut |_| ControlFlow::Continue(()))
+    solver.finish(&mut on)
 }
 
 fn new(error: f32) -> Solver {
@@ -111,18 +98,9 @@ fn spent_budgets_are_no_end() {
 #[test]
 fn what_is_kept_goes_on_as_if_it_had_never_been_away() {
     let stopped = || finished(new(ERROR), 40);
-    let mut bytes = Vec::new();
-    stopped().store(&mut Writer::new(&mut bytes)).expect("memory takes everything");
-    let words = words_of(&bytes);
+    let words = stored(&stopped());
     let read = Solution::restore(&room(), (), &mut Reader::new(&words)).expect("what was written");
     let (there, here) = (go_on(read, ERROR), go_on(stopped(), ERROR));
     assert_eq!(there.links.all(), here.links.all(), "links");
     assert_eq!(there.exitant.irradiance, here.exitant.irradiance, "light");
-}
-
-/// Bytes as words; there are whole ones.
-fn words_of(bytes: &[u8]) -> Vec<u64> {
-    let (words, rest) = bytes.as_chunks::<8>();
-    assert!(rest.is_empty(), "arrays end at words");
-    words.iter().map(|word| u64::from_ne_bytes(*word)).collect()
 }
