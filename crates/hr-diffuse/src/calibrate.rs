@@ -2,12 +2,12 @@
 //!
 //! Rows of form factors (see [`leaf_rows`](crate::leaf_rows)) say how much is seen, not how bright it is: what is bright is
 //! seen by chance a little too much or too little, all over a region alike, and each bounce repeats it. Rays from all over a
-//! region know the mean, whatever the links. Few rays tell the mean of much, and little of a part; so each part is taken to be
+//! region know the mean, whatever the links. (Of narrow lobes they would miss the peaks: directional light is left out on both sides.) Few rays tell the mean of much, and little of a part; so each part is taken to be
 //! as the whole that it belongs to, as far as its own rays do not know better.
 
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
-use crate::residual::reflected_along;
+use crate::residual::diffuse_along;
 use crate::sampling::{cosine_direction, hash, point4};
 use crate::threads::{self, prelude::*};
 use crate::transport::Light;
@@ -25,7 +25,7 @@ pub(crate) struct Doubt {
 }
 
 /// Of what vertices gather, against the light of the leaves around.
-pub(crate) const OF_VERTICES: Doubt = Doubt { whole: 0.1, part: 0.1, noise: 0.02 };
+pub(crate) const OF_VERTICES: Doubt = Doubt { whole: 0.1, part: 0.05, noise: 0.2 };
 /// Of what links bring, against single rays.
 const OF_LINKS: Doubt = Doubt { whole: 0.1, part: 0.03, noise: 0.25 };
 
@@ -71,7 +71,7 @@ impl Sums {
     }
 }
 
-/// Factors for reflected light, in the order of leaves with what links bring of it (sum of channels), from so many rays, and how many were
+/// Factors for reflected light, in the order of leaves with what links bring of what is reflected diffusely (sum of channels), from so many rays, and how many were
 /// shot. `None` where `watch` breaks.
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
@@ -116,7 +116,7 @@ pub(crate) fn calibrate<L: LightField>(
             let u = point4(seed, ray);
             let (x, normal, _) = geometry.sample_area(element.domain, u.z, u.w);
             let n = if element.kind == Kind::Back { -normal } else { normal };
-            let found = reflected_along(light, x, cosine_direction(n, u.x, u.y), element.source);
+            let found = diffuse_along(light, x, cosine_direction(n, u.x, u.y), element.source);
             sums.add(&Sums::of(each * f64::from(found), each * f64::from(brought)));
         }
         sums
@@ -193,7 +193,7 @@ mod tests {
     /// Factors by leaf, where links bring the leaves this share of what they should.
     fn factors(solver: &Solver, share: impl Fn(u32) -> f32, rays: usize) -> (Vec<u32>, Vec<f32>) {
         let light = solver.light();
-        let mut brought = solver.gather.reflected(light, &solver.links);
+        let mut brought = solver.gather.diffuse(light, &solver.links);
         for (leaf, brought) in &mut brought {
             *brought *= share(*leaf);
         }

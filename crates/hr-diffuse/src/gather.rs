@@ -112,7 +112,7 @@ impl Gather {
         gather
     }
 
-    /// Compares what arrives of reflected light with what about so many rays find, and makes it so; returns the number of rays.
+    /// Compares what arrives of diffusely reflected light with what so many rays find, and makes it so; returns the number of rays.
     pub(crate) fn calibrate<L: LightField>(
         &mut self,
         light: Light<'_, L>,
@@ -120,26 +120,55 @@ impl Gather {
         rays: usize,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> u64 {
-        let brought = self.reflected(light, links);
+        let brought = self.diffuse(light, links);
         let Some((factors, rays)) = calibrate(light, &brought, rays, watch) else { return 0 };
-        for (row, factor) in self.rows.iter_mut().zip(factors) {
+        // Nothing was found out about directional light, which arrives through the same links.
+        let indirect = self.indirect(light, links);
+        for (((row, factor), (_, diffuse)), (_, all)) in self.rows.iter_mut().zip(factors).zip(brought).zip(indirect) {
+            let share = if all > 0.0 { (diffuse / all).min(1.0) } else { 0.0 };
+            let factor = 1.0 + (factor - 1.0) * share;
             row[Group::Rest as usize] *= factor;
             row[Group::Faint as usize] *= factor;
         }
         rays
     }
 
-    /// By leaf, what arrives there of reflected light (sum of channels).
-    pub(crate) fn reflected<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
+    /// Whether it was prepared for these links.
+    pub(crate) fn is_for(&self, links: &Links) -> bool {
+        !self.push.leaves.is_empty() && self.groups.len() == links.all().len()
+    }
+
+    /// By leaf, what arrives there of light that has been reflected (sum of channels).
+    pub(crate) fn indirect<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
         let shares = light.reflected_shares();
-        let reflected = |(link, spread): (&Link, &Spread)| {
-            carried(light, link, *spread, None).element_sum() * shares[link.sender as usize]
-        };
-        let reflected: Vec<f32> = links.all().par_iter().zip(&self.push.spreads).map(reflected).collect();
-        let even = sums(light.elements, links, &self.groups, &self.push.spreads, &reflected);
+        self.by_leaf(light, links, |link, spread| {
+            carried(light, link, spread, None).element_sum() * shares[link.sender as usize]
+        })
+    }
+
+    /// By leaf, what arrives there of light that has been reflected diffusely (sum of channels).
+    pub(crate) fn diffuse<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
+        let shares = light.reflected_shares();
+        self.by_leaf(light, links, |link, spread| {
+            let away = -light.direction_to(light.element(link.receiver).center, link.sender);
+            let factor = link.factor * visible(link, spread) * shares[link.sender as usize];
+            light.diffuse(link.sender, away).element_sum() * factor
+        })
+    }
+
+    /// By leaf, what links bring that carry what `of` says.
+    fn by_leaf<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        links: &Links,
+        of: impl Fn(&Link, Spread) -> f32 + Sync,
+    ) -> Vec<(u32, f32)> {
+        let carried = links.all().par_iter().zip(&self.push.spreads).map(|(link, spread)| of(link, *spread));
+        let carried: Vec<f32> = carried.collect();
+        let even = sums(light.elements, links, &self.groups, &self.push.spreads, &carried);
         let brought = |index: usize| {
-            let [_, sums @ ..] = self.push.sum(light, links, index, (&self.groups, &reflected, &even));
-            let sum = sums.iter().zip(&self.rows[index][1..]).map(|(sum, factor)| sum * factor).sum();
+            let sums = self.push.sum(light, links, index, (&self.groups, &carried, &even));
+            let sum = sums.iter().zip(self.rows[index]).map(|(sum, factor)| sum * factor).sum();
             (self.push.leaves[index], sum)
         };
         (0..self.push.leaves.len()).into_par_iter().with_min_len(64).map(brought).collect()

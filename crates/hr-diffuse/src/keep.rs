@@ -197,6 +197,7 @@ impl Exitant {
         out.put(&self.range)?;
         out.put(&self.facing)?;
         out.put(&self.irradiance)?;
+        out.put(&self.indirect)?;
         out.put(&self.directional)?;
         out.put(&self.reflected_as)?;
         out.put(&self.gain)?;
@@ -214,6 +215,7 @@ impl Exitant {
             range: from.take_finite("ranges of radiosity")?,
             facing: from.take_finite("directions of radiosity")?,
             irradiance: from.take_finite("irradiances")?,
+            indirect: from.take_finite("indirect irradiances")?,
             directional: from.take_finite("directional light")?,
             reflected_as: from.take("nodes that stand for others")?,
             gain: from.take_finite("gains")?,
@@ -228,6 +230,7 @@ impl Exitant {
             exitant.range.len(),
             exitant.facing.len(),
             exitant.irradiance.len(),
+            exitant.indirect.len(),
             exitant.directional.len(),
             exitant.reflected_as.len(),
             exitant.gain.len(),

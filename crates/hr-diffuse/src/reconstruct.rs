@@ -214,10 +214,10 @@ fn lay_out(scene: &SceneData, elements: &Elements) -> Vertices {
 }
 
 impl Vertices {
-    /// The mean irradiance over a leaf (sum of channels); `None` for a leaf without extent.
-    fn mean(&self, leaf: u32) -> Option<f32> {
+    /// The mean over a leaf of what is known at vertices; `None` for a leaf without extent.
+    fn mean(&self, leaf: u32, values: &[f32]) -> Option<f32> {
         let (middle, outline) = self.fan(leaf).split_first()?;
-        let value = |corner: &Corner| self.irradiance[corner.vertex as usize].element_sum();
+        let value = |corner: &Corner| values[corner.vertex as usize];
         let (mut sum, mut area) = (0.0, 0.0);
         for (i, a) in outline.iter().enumerate() {
             let b = &outline[(i + 1) % outline.len()];
@@ -262,6 +262,8 @@ pub(crate) fn reconstruct<L: LightField>(
     let mut rays = 0;
     let chunk = BETWEEN_WATCHES * threads::current_num_threads();
     let mut covered = Vec::with_capacity(count);
+    let shares = light.reflected_shares();
+    let mut indirect: Vec<f32> = Vec::with_capacity(count);
     for start in (0..count).step_by(chunk) {
         if watch(start as f32 / count as f32).is_break() {
             for vertex in start..count {
@@ -270,6 +272,7 @@ pub(crate) fn reconstruct<L: LightField>(
                 vertices.irradiance[vertex] = sum / around.len().max(1) as f32;
             }
             covered.resize(count, false);
+            indirect.resize(count, 0.0);
             break;
         }
         let end = (start + chunk).min(count);
@@ -281,31 +284,35 @@ pub(crate) fn reconstruct<L: LightField>(
                 if around.iter().all(|&leaf| light.element(leaf).importance <= 0.0) {
                     return Gathering::default();
                 }
-                gather_at(light, links, vertices.leaf[vertex], vertices.uv[vertex], vertex as u32)
+                gather_at(light, (links, &shares), vertices.leaf[vertex], vertices.uv[vertex], vertex as u32)
             })
             .collect();
         for (vertex, gathering) in (start..end).zip(part) {
             rays += u64::from(gathering.rays);
             vertices.irradiance[vertex] = gathering.irradiance;
             covered.push(gathering.covered);
+            indirect.push(gathering.indirect);
         }
     }
-    agree(light, &mut vertices);
+    agree(light, &mut vertices, &indirect);
     uncover(&mut vertices, &covered);
     (vertices, rays)
 }
 
-/// What vertices gather, with links made for something larger, is made to agree with what the leaves around have, which has been
-/// compared with more rays: region by region, so that it stays as smooth as it is.
-fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices) {
+/// What vertices gather of reflected light, with links made for something larger, is made to agree with what the leaves around have,
+/// which has been compared with more rays: region by region, so that it stays as smooth as it is. Direct light may vary over a leaf in ways
+/// that its mean does not tell.
+fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, gathered: &[f32]) {
+    if light.exitant.indirect.iter().all(|&indirect| indirect == 0.0) {
+        return;
+    }
     let compared = |leaf: u32| {
         let element = light.element(leaf);
         let counts = element.importance > 0.0 && light.elements.exposed(leaf) >= 1.0;
-        let mean = vertices.mean(leaf).filter(|_| counts);
+        let mean = vertices.mean(leaf, gathered).filter(|&mean| counts && mean > 0.0);
         let sums = mean.map(|mean| {
             let weight = f64::from(element.area * element.importance);
-            let have = light.exitant.irradiance[leaf as usize];
-            Sums::of(weight * f64::from(have.element_sum()), weight * f64::from(mean))
+            Sums::of(weight * f64::from(light.exitant.indirect[leaf as usize]), weight * f64::from(mean))
         });
         (leaf, sums.unwrap_or_default())
     };
@@ -315,8 +322,12 @@ fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices) {
         let sum: f64 = around.iter().map(|&leaf| factors[leaf as usize]).sum();
         (sum / around.len().max(1) as f64).clamp(MOST_CHANGE.recip(), MOST_CHANGE) as f32
     };
-    let changed: Vec<Rgb> = (0..).zip(&vertices.irradiance).map(|(vertex, before)| before * factor(vertex)).collect();
-    vertices.irradiance = changed;
+    let changed = |vertex: u32| {
+        let before = vertices.irradiance[vertex as usize];
+        let share = gathered[vertex as usize] / before.element_sum().max(f32::MIN_POSITIVE);
+        before * (1.0 + (factor(vertex) - 1.0) * share.min(1.0))
+    };
+    vertices.irradiance = (0..gathered.len() as u32).map(changed).collect();
 }
 
 /// Nobody sees the darkness behind a picture on a wall or below a cupboard, but interpolation would carry it to where it
@@ -341,7 +352,13 @@ fn uncover(vertices: &mut Vertices, covered: &[bool]) {
 }
 
 /// Irradiance at a point of a leaf, gathered over all links that light it.
-fn gather_at<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, uv: Vec2, seed: u32) -> Gathering {
+fn gather_at<L: LightField>(
+    light: Light<'_, L>,
+    (links, shares): (&Links, &[f32]),
+    leaf: u32,
+    uv: Vec2,
+    seed: u32,
+) -> Gathering {
     let element = light.element(leaf);
     let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET));
@@ -365,6 +382,8 @@ fn gather_at<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, uv: V
     }
     // Light whose visibility is known here, and light with the visibility that links have for something larger.
     let (mut own, mut kept) = ([Rgb::ZERO; 3], [Rgb::ZERO; 3]);
+    // What of both has been reflected.
+    let mut reflected = [[0.0; 3]; 2];
     let (mut rays, mut row) = (0, Row::default());
     let mut known_here: SmallVec<[u32; 64]> = SmallVec::new();
     let seed = hash(seed, 0x51ed);
@@ -384,6 +403,8 @@ fn gather_at<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, uv: V
         }
         let group = Group::of(light, sender);
         (if known { &mut own } else { &mut kept })[group as usize] += irradiance * visibility.abs();
+        reflected[usize::from(!known)][group as usize] +=
+            irradiance.element_sum() * visibility.abs() * shares[sender as usize];
         *match group {
             Group::Light => continue,
             Group::Emitter => &mut row.emitters,
@@ -396,13 +417,17 @@ fn gather_at<L: LightField>(light: Light<'_, L>, links: &Links, leaf: u32, uv: V
     let seen = look_around(light, (x, n, element.source), seed, COVER * element.radius, is_own);
     let Correction { inherited, rest, all } = row.correction(&seen);
     let irradiance = own[0] + kept[0] + (own[1] + kept[1] + (own[2] + kept[2] * inherited) * rest) * all;
-    Gathering { irradiance, rays, covered: seen.covered }
+    let [known, others] = reflected;
+    let indirect = (known[1] + others[1] + (known[2] + others[2] * inherited) * rest) * all;
+    Gathering { irradiance, indirect, rays, covered: seen.covered }
 }
 
 /// What was gathered at a vertex; nothing where only black surfaces meet.
 #[derive(Default)]
 struct Gathering {
     irradiance: Rgb,
+    /// What of it has been reflected before (sum of channels).
+    indirect: f32,
     rays: u32,
     covered: bool,
 }
@@ -413,4 +438,46 @@ struct Arriving {
     share: f32,
     visibility: f32,
     sender: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::DVec3;
+
+    /// Links that bring too little are noticed by the leaves' light, which vertices are made to agree with.
+    #[test]
+    fn vertices_agree_with_their_leaves() {
+        let (x, y, z, o) = (DVec3::X, DVec3::Y, DVec3::Z, DVec3::ZERO);
+        let quad =
+            |o: DVec3, a: DVec3, b: DVec3, material| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), material);
+        let wall = DiffuseMaterial { reflectance: Rgb::splat(0.6), exitance: Rgb::ZERO, two_sided: false };
+        let lamp = DiffuseMaterial { exitance: Rgb::ONE, ..wall };
+        let light = quad(DVec3::new(0.3, 0.3, 0.99), y * 0.4, x * 0.4, 1);
+        // One side is open, so that nobody knows how much there is to see.
+        let surfaces =
+            vec![quad(o, x, y, 0), quad(z, y, x, 0), quad(o, y, z, 0), quad(x, z, y, 0), quad(o, z, x, 0), light];
+        let input = SceneInput { surfaces, materials: vec![wall, lamp], ..SceneInput::default() };
+        let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        let mean = |solver: &Solver, links: &Links| {
+            let (vertices, _) = reconstruct(solver.light(), links, &mut |_| ControlFlow::Continue(()));
+            vertices.irradiance.iter().map(|irradiance| irradiance.x).sum::<f32>() / vertices.irradiance.len() as f32
+        };
+        let right = mean(&solver, &solver.links);
+        let emits = |sender: u32| Group::of(solver.light(), sender) == Group::Emitter;
+        let dimmed = solver.links.all().iter().map(|link| {
+            let visibility = link.visibility * if emits(link.sender) { 1.0 } else { 0.6 };
+            crate::links::Link { visibility, ..*link }
+        });
+        let dimmed = Links::new(dimmed.collect(), solver.elements.nodes.len());
+        let alone = mean(&solver, &dimmed);
+        for (leaf, indirect) in solver.gather.indirect(solver.light(), &solver.links) {
+            solver.exitant.indirect[leaf as usize] = indirect;
+        }
+        let agreed = mean(&solver, &dimmed);
+        assert!(alone < 0.96 * right, "vertices themselves do not know: {alone} of {right}");
+        assert!((agreed / right - 1.0).abs() < 0.3 * (1.0 - alone / right), "{agreed}, {alone} of {right}");
+    }
 }

@@ -279,6 +279,7 @@ fn split_elements<L: LightField>(light: &mut MutableLight<'_, L>, wave: &[Candid
                 exitant.range.push([own, own]);
                 exitant.facing.push(element.facing);
                 exitant.irradiance.push(exitant.irradiance[parent]);
+                exitant.indirect.push(0.0);
                 exitant.directional.push(exitant.directional[parent]);
                 exitant.reflected_as.push(exitant.reflected_as[parent]);
                 exitant.peak.push(0.0);

@@ -6,6 +6,7 @@
 //! light gets wrong (D. Lischinski, B. Smits, D. Greenberg, "Bounds and error estimates for radiosity", SIGGRAPH 1994,
 //! section 3). Each leaf is looked at twice: the two estimates' difference tells how much of it is the rays' own noise.
 
+use crate::Rgb;
 use crate::hierarchy::Kind;
 use crate::hooks::LightField;
 use crate::sampling::{cosine_direction, hash, point4, unit};
@@ -258,21 +259,30 @@ fn reflected<L: LightField>(light: Light<'_, L>, leaf: u32, seed: u32) -> f32 {
         let (x, n) = point(light, leaf, Vec2::new(u.z, u.w));
         let direction = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + Vec2::new(u.x, u.y)) / GRID as f32;
         let direction = cosine_direction(n, direction.x, direction.y);
-        sum += reflected_along(light, x, direction, surface);
+        let Some(sender) = seen_along(light, x, direction, surface) else { continue };
+        sum += (light.emitted(sender, -direction) - own_light(light, sender)).max(Rgb::ZERO).element_sum();
     }
     sum / (GRID * GRID) as f32
 }
 
-/// Light that has been reflected toward a point of a surface (π times its radiance, sum of channels) by what a ray in a direction meets.
-pub(crate) fn reflected_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> f32 {
-    let hit = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface);
-    let Some(sender) = hit.and_then(|hit| light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv)) else {
-        return 0.0;
-    };
-    let element = light.element(sender.0);
-    let emitted = match element.kind {
-        Kind::Front => light.scene.materials[element.material as usize].exitance.element_sum(),
-        _ => 0.0,
-    };
-    (light.emitted(sender.0, -direction).element_sum() - emitted).max(0.0)
+/// The leaf that a ray from a surface meets.
+fn seen_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> Option<u32> {
+    let hit = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface)?;
+    Some(light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv)?.0)
+}
+
+/// What a leaf emits of its own.
+fn own_light<L: LightField>(light: Light<'_, L>, leaf: u32) -> Rgb {
+    let element = light.element(leaf);
+    match element.kind {
+        Kind::Front => light.scene.materials[element.material as usize].exitance,
+        _ => Rgb::ZERO,
+    }
+}
+
+/// Light that has been reflected diffusely toward a point of a surface (π times its radiance, sum of channels) by what a ray in a
+/// direction meets.
+pub(crate) fn diffuse_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> f32 {
+    let diffuse = |sender: u32| light.exitant.radiosity[sender as usize] - own_light(light, sender);
+    seen_along(light, x, direction, surface).map_or(0.0, |sender| diffuse(sender).max(Rgb::ZERO).element_sum())
 }

@@ -48,6 +48,12 @@ impl<L: LightField> Solver<L> {
         let (links, nodes) = (self.links.all().len() as u64, self.elements.nodes.len() as u64);
         let error = self.settings.error;
         let mut stopped = false;
+        // A solution that was kept, and left as it was, knows it already.
+        if self.gather.is_for(&self.links) {
+            for (leaf, indirect) in self.gather.indirect(self.light(), &self.links) {
+                self.exitant.indirect[leaf as usize] = indirect;
+            }
+        }
         let (vertices, rays) = reconstruct(self.light(), &self.links, &mut |share| {
             let answer =
                 watch(&Progress { phase: Phase::Reconstruct, fraction: 0.9 + 0.1 * share, error, links, nodes });

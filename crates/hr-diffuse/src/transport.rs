@@ -33,6 +33,8 @@ pub struct Exitant {
     pub facing: Vec<Facing>,
     /// Mean irradiance on those of the node's surfaces that reflect any light, W/m².
     pub irradiance: Vec<Rgb>,
+    /// By leaf, mean irradiance by light that has been reflected before, W/m², sum of channels.
+    pub indirect: Vec<f32>,
     /// Mean radiant exitance as directional light, W/m².
     pub directional: Vec<Rgb>,
     /// Leaves that stand for the senders of directional light.
@@ -75,15 +77,19 @@ impl<L: LightField> Light<'_, L> {
         let element = self.element(sender);
         match element.kind {
             Kind::Light => self.scene.lights[element.source as usize].intensity,
-            Kind::Cluster => {
-                let pattern = self.exitant.facing[sender as usize].mean_cosine(away);
-                let diffuse = self.exitant.radiosity[sender as usize] * pattern;
-                (diffuse + self.directional(sender, away) * self.exitant.gain[sender as usize]).max(Rgb::ZERO)
+            Kind::Cluster | Kind::Front | Kind::Back => {
+                let directional = self.directional(sender, away) * self.exitant.gain[sender as usize];
+                (self.diffuse(sender, away) + directional).max(Rgb::ZERO)
             }
-            Kind::Front | Kind::Back => {
-                let diffuse = self.exitant.radiosity[sender as usize];
-                (diffuse + self.directional(sender, away) * self.exitant.gain[sender as usize]).max(Rgb::ZERO)
-            }
+        }
+    }
+
+    /// The diffuse part of [`emitted`](Self::emitted), emission included.
+    pub(crate) fn diffuse(&self, sender: u32, away: Vec3) -> Rgb {
+        let radiosity = self.exitant.radiosity[sender as usize];
+        match self.element(sender).kind {
+            Kind::Cluster => radiosity * self.exitant.facing[sender as usize].mean_cosine(away),
+            Kind::Light | Kind::Front | Kind::Back => radiosity,
         }
     }
 

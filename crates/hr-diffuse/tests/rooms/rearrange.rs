@@ -98,14 +98,14 @@ fn moved(change: impl Fn(&mut SceneInput)) -> (Cost, Solver) {
 fn a_moved_box_is_lit_as_if_it_had_always_been_there() {
     let (Cost { links, rays }, _) =
         moved(|input| place(input, BOX, DAffine3::from_translation(DVec3::new(1.3, -0.6, 0.0))));
-    assert!(links < 0.35 && rays < 0.75, "{links} of all links, {rays} of all rays");
+    assert!(links < 0.4 && rays < 0.9, "{links} of all links, {rays} of all rays");
 }
 
 #[test]
 fn a_small_move_of_something_small_costs_little() {
     let (Cost { links, rays }, _) =
         moved(|input| place(input, CUP, DAffine3::from_translation(DVec3::new(0.05, 0.0, 0.0))));
-    assert!(links < 0.12 && rays < 0.2, "{links} of all links, {rays} of all rays");
+    assert!(links < 0.18 && rays < 0.3, "{links} of all links, {rays} of all rays");
 }
 
 #[test]
