@@ -34,8 +34,8 @@ const MOST: f64 = 1.2;
 /// … and by less where more than this share of it is reflected, in proportion to what is not: what is wrong is repeated many times there,
 /// and the rows' sums are right. So rows of form factors times reflectance stay below 1 if they were before.
 const REFLECTED: f64 = 0.8;
-/// Leaves that a thread looks from between two calls of `watch`.
-const BETWEEN_WATCHES: usize = 256;
+/// Leaves that a thread looks from between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 64;
 
 /// Sums over observations: of what was found, of what is compared with it, and of the squares.
 #[derive(Clone, Copy, Debug, Default)]

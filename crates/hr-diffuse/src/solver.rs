@@ -414,15 +414,19 @@ impl<L: LightField> Solver<L> {
         }
         let reflects = |leaf: &u32| self.elements.nodes[*leaf as usize].importance > 0.0;
         let rays = CALIBRATE_RAYS * self.elements.patch_leaves().filter(reflects).count();
-        let start = Instant::now();
+        let (start, account) = (Instant::now(), self.account);
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         let mut gather = std::mem::take(&mut self.gather);
-        self.stats.check_rays += gather.calibrate(self.light(), &self.links, rays, &mut || {
+        let shot = gather.calibrate(self.light(), &self.links, rays, &mut || {
             *stopped = *stopped || watch(&progress).is_break();
-            if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if *stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         self.gather = gather;
+        self.stats.check_rays += shot;
         self.stats.seconds.check += start.elapsed().as_secs_f64();
+        if shot == 0 {
+            return;
+        }
         self.convergence.restart();
         self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, true), stopped, watch);
     }
