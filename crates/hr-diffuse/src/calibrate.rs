@@ -150,13 +150,15 @@ pub(crate) fn factors(elements: &Elements, found: impl Iterator<Item = (u32, Sum
         sums[nodes[node].parent as usize].add(&sum);
     }
     let mut factors = vec![1.0_f64; nodes.len()];
+    let mut ratios = vec![1.0_f64; nodes.len()];
     for node in 0..nodes.len() {
-        let (whole, off) =
-            if node == 0 { (1.0, doubt.whole) } else { (factors[nodes[node].parent as usize], doubt.part) };
-        factors[node] = whole;
+        let (above, off) = if node == 0 { (0, doubt.whole) } else { (nodes[node].parent as usize, doubt.part) };
+        // What tells a part from its whole is the difference of what was found: the whole has been told already.
+        (factors[node], ratios[node]) = (factors[above], ratios[above]);
         if let Some((ratio, variance)) = sums[node].ratio(doubt.noise) {
-            let prior = off * off * whole * whole;
-            factors[node] = whole + (ratio - whole) * prior / (prior + variance).max(f64::MIN_POSITIVE);
+            let prior = (off * ratios[above]).powi(2);
+            factors[node] += (ratio - ratios[above]) * prior / (prior + variance).max(f64::MIN_POSITIVE);
+            ratios[node] = ratio;
         }
     }
     factors

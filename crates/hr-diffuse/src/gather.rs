@@ -37,6 +37,8 @@ pub(crate) enum Group {
 /// How many there are.
 pub(crate) const GROUPS: usize = 4;
 
+/// What arrives at a leaf of reflected light is calibrated where at least this share of it is diffuse.
+const MOSTLY_DIFFUSE: f32 = 0.9;
 /// Clusters that emit more than this share of their power count as emitters.
 const MOSTLY: f32 = 0.5;
 
@@ -120,15 +122,17 @@ impl Gather {
         rays: usize,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> u64 {
-        let brought = self.diffuse(light, links);
+        let mut brought = self.diffuse(light, links);
+        // Leaves have one weight for all that a link carries: where lobes make it, it tells nothing of what is diffuse.
+        for ((_, diffuse), (_, all)) in brought.iter_mut().zip(self.indirect(light, links)) {
+            *diffuse = if *diffuse >= MOSTLY_DIFFUSE * all { *diffuse } else { 0.0 };
+        }
         let Some((factors, rays)) = calibrate(light, &brought, rays, watch) else { return 0 };
-        // Nothing was found out about directional light, which arrives through the same links.
-        let indirect = self.indirect(light, links);
-        for (((row, factor), (_, diffuse)), (_, all)) in self.rows.iter_mut().zip(factors).zip(brought).zip(indirect) {
-            let share = if all > 0.0 { (diffuse / all).min(1.0) } else { 0.0 };
-            let factor = 1.0 + (factor - 1.0) * share;
-            row[Group::Rest as usize] *= factor;
-            row[Group::Faint as usize] *= factor;
+        for ((row, factor), (_, diffuse)) in self.rows.iter_mut().zip(factors).zip(brought) {
+            if diffuse > 0.0 {
+                row[Group::Rest as usize] *= factor;
+                row[Group::Faint as usize] *= factor;
+            }
         }
         rays
     }
