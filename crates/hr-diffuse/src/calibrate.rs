@@ -2,8 +2,9 @@
 //!
 //! Rows of form factors (see [`leaf_rows`](crate::leaf_rows)) say how much is seen, not how bright it is: what is bright is
 //! seen by chance a little too much or too little, all over a region alike, and each bounce repeats it. Rays from all over a
-//! region know the mean, whatever the links. (Of narrow lobes they would miss the peaks: directional light is left out on both sides.) Few rays tell the mean of much, and little of a part; so each part is taken to be
-//! as the whole that it belongs to, as far as its own rays do not know better.
+//! region know the mean, whatever the links. Few rays tell the mean of much, and little of a part; so each part is taken to be
+//! as the whole that it belongs to, as far as its own rays do not know better. Of narrow lobes rays would miss the peaks:
+//! directional light is left out on both sides.
 
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
@@ -31,8 +32,8 @@ const OF_LINKS: Doubt = Doubt { whole: 0.1, part: 0.03, noise: 0.25 };
 
 /// Light is changed by no more than this factor, …
 const MOST: f64 = 1.2;
-/// … and by less where more than this share of it is reflected, in proportion to what is not: what is wrong is repeated many times there,
-/// and the rows' sums are right. So rows of form factors times reflectance stay below 1 if they were before.
+/// … and by less where more than this share of it is reflected, in proportion to what is not: what is wrong is repeated many
+/// times there, and the rows' sums are right. So rows of form factors times reflectance stay below 1 if they were before.
 const REFLECTED: f64 = 0.8;
 /// Leaves that a thread looks from between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 64;
@@ -71,8 +72,8 @@ impl Sums {
     }
 }
 
-/// Factors for reflected light, in the order of leaves with what links bring of what is reflected diffusely (sum of channels), from so many rays, and how many were
-/// shot. `None` where `watch` breaks.
+/// Factors for reflected light, in the order of the leaves in `brought`, each with what links bring of diffusely reflected light
+/// (sum of channels); from so many rays, and how many were shot. `None` where `watch` breaks.
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
     brought: &[(u32, f32)],

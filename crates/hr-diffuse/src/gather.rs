@@ -123,9 +123,11 @@ impl Gather {
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> u64 {
         let mut brought = self.diffuse(light, links);
-        // Leaves have one weight for all that a link carries: where lobes make it, it tells nothing of what is diffuse.
-        for ((_, diffuse), (_, all)) in brought.iter_mut().zip(self.indirect(light, links)) {
-            *diffuse = if *diffuse >= MOSTLY_DIFFUSE * all { *diffuse } else { 0.0 };
+        if light.element(0).active {
+            // Leaves have one weight for all that a link carries: where lobes make it, it tells nothing of what is diffuse.
+            for ((_, diffuse), (_, all)) in brought.iter_mut().zip(self.indirect(light, links)) {
+                *diffuse = if *diffuse >= MOSTLY_DIFFUSE * all { *diffuse } else { 0.0 };
+            }
         }
         let Some((factors, rays)) = calibrate(light, &brought, rays, watch) else { return 0 };
         for ((row, factor), (_, diffuse)) in self.rows.iter_mut().zip(factors).zip(brought) {

@@ -303,6 +303,7 @@ pub(crate) fn reconstruct<L: LightField>(
 /// which has been compared with more rays: region by region, so that it stays as smooth as it is. Direct light may vary over a leaf in ways
 /// that its mean does not tell.
 fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, gathered: &[f32]) {
+    // Of a solution without reflected light, or one that was stopped before any, there is nothing to agree with.
     if light.exitant.indirect.iter().all(|&indirect| indirect == 0.0) {
         return;
     }
