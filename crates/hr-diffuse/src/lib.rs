@@ -45,6 +45,7 @@ pub mod sampling;
 pub mod scene;
 mod sealed;
 mod segments;
+mod shadows;
 mod shooting;
 mod skips;
 pub mod solution;

@@ -41,6 +41,11 @@ impl Links {
         Self { all, first }
     }
 
+    /// There are more nodes now, none of which receives through a link.
+    pub(crate) fn grow(&mut self, nodes: usize) {
+        self.first.resize(nodes + 1, self.all.len() as u32);
+    }
+
     /// All of them.
     #[must_use]
     pub fn all(&self) -> &[Link] {

@@ -23,7 +23,7 @@ use std::ops::ControlFlow;
 
 /// Light is gathered this far from a vertex toward the middle of its leaf: on an edge or in a corner of a room the
 /// horizon and the rays would graze the neighbouring surface.
-const INSET: f32 = 0.02;
+pub(crate) const INSET: f32 = 0.02;
 /// Rays for a link that carries all of a vertex's light; others in proportion.
 const RAYS: f32 = 96.0;
 /// No link gets more rays than this at one vertex.
@@ -134,7 +134,7 @@ fn key(position: Vec3, normal: Vec3, material: u32) -> Key {
 }
 
 /// A point of an element as display sees it: position and normal on the element's side.
-fn point_on(scene: &SceneData, elements: &Elements, leaf: u32, uv: Vec2) -> (Vec3, Vec3) {
+pub(crate) fn point_on(scene: &SceneData, elements: &Elements, leaf: u32, uv: Vec2) -> (Vec3, Vec3) {
     let element = &elements.nodes[leaf as usize];
     let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
     let position = scene.surfaces()[element.source as usize].point(uv);
@@ -142,7 +142,7 @@ fn point_on(scene: &SceneData, elements: &Elements, leaf: u32, uv: Vec2) -> (Vec
 }
 
 /// Lays out the fans of all leaves; irradiance is zero still.
-fn lay_out(scene: &SceneData, elements: &Elements) -> Vertices {
+pub(crate) fn lay_out(scene: &SceneData, elements: &Elements) -> Vertices {
     let mut vertices = Vertices::default();
     let mut index: HashMap<Key, u32> = HashMap::new();
     let leaves: Vec<u32> = elements.patch_leaves().collect();

@@ -14,6 +14,7 @@ use crate::oracle::{FactorBounds, factor_bounds};
 use crate::proofs;
 use crate::sampling::hash;
 use crate::segments;
+use crate::shadows;
 use crate::skips::Skips;
 use crate::stats::Skipped;
 use crate::threads::{self, prelude::*};
@@ -71,6 +72,10 @@ pub(crate) struct Pair {
 pub(crate) struct Tolerance {
     /// Irradiance × importance × √(receiver's share of all area) that a link may be wrong by.
     pub(crate) error: f32,
+    /// The same for light that is there on one side of a shadow's edge and not on the other.
+    pub(crate) shadow: f32,
+    /// Whether links that are there already are looked at for it, too.
+    pub(crate) kept_too: bool,
     /// Total surface area, the measure of a receiver's.
     pub(crate) area: f32,
     /// Radius in unit space below which elements are not split.
@@ -115,6 +120,8 @@ pub(crate) struct Refined {
     pub(crate) skipped: Skipped,
     pub(crate) pairs: u64,
     pub(crate) rays: u64,
+    /// Splits along the edges of shadows.
+    pub(crate) edges: u64,
     pub(crate) visibility_seconds: f64,
     pub(crate) stopped: bool,
     pub(crate) spent: Option<Spent>,
@@ -124,6 +131,7 @@ pub(crate) struct Refined {
 #[derive(Default)]
 struct Counters {
     rays: AtomicU64,
+    edges: AtomicU64,
     nanoseconds: AtomicU64,
 }
 
@@ -232,6 +240,7 @@ pub(crate) fn refine<L: LightField>(
         wave = next;
     }
     refined.rays = counters.rays.into_inner();
+    refined.edges = counters.edges.into_inner();
     refined.visibility_seconds =
         counters.nanoseconds.into_inner() as f64 * 1e-9 / threads::current_num_threads() as f64;
     refined
@@ -248,7 +257,7 @@ pub(crate) struct MutableLight<'a, L: LightField> {
 }
 
 impl<L: LightField> MutableLight<'_, L> {
-    fn read(&self) -> Light<'_, L> {
+    pub(crate) fn read(&self) -> Light<'_, L> {
         Light {
             scene: self.scene,
             elements: self.elements,
@@ -257,36 +266,39 @@ impl<L: LightField> MutableLight<'_, L> {
             reflected: self.reflected,
         }
     }
+
+    /// Splits a node, unless it has parts already.
+    pub(crate) fn split(&mut self, node: u32) {
+        self.elements.split(self.scene, node);
+        let exitant = &mut *self.exitant;
+        for child in exitant.radiosity.len()..self.elements.nodes.len() {
+            let element = &self.elements.nodes[child];
+            let parent = element.parent as usize;
+            // A textured part reflects its own share of the parent's irradiance.
+            let emitted = if element.kind == Kind::Front {
+                self.scene.materials[element.material as usize].exitance
+            } else {
+                Vec3::ZERO
+            };
+            let own =
+                emitted + exitant.irradiance[parent] * (element.reflectance + self.faint[element.material as usize]);
+            exitant.radiosity.push(own);
+            exitant.range.push([own, own]);
+            exitant.facing.push(element.facing);
+            exitant.irradiance.push(exitant.irradiance[parent]);
+            exitant.indirect.push(0.0);
+            exitant.directional.push(exitant.directional[parent]);
+            exitant.reflected_as.push(exitant.reflected_as[parent]);
+            exitant.peak.push(0.0);
+            exitant.gain.push(exitant.gain[parent]);
+            self.reflected.push(L::Exitant::default());
+        }
+    }
 }
 
 fn split_elements<L: LightField>(light: &mut MutableLight<'_, L>, wave: &[Candidate], verdicts: &[Verdict]) {
     for (Candidate { pair, .. }, verdict) in wave.iter().zip(verdicts) {
-        for node in verdict.split(*pair) {
-            light.elements.split(light.scene, node);
-            let (scene, exitant) = (light.scene, &mut *light.exitant);
-            for child in exitant.radiosity.len()..light.elements.nodes.len() {
-                let element = &light.elements.nodes[child];
-                let parent = element.parent as usize;
-                // A textured part reflects its own share of the parent's irradiance.
-                let emitted = if element.kind == Kind::Front {
-                    scene.materials[element.material as usize].exitance
-                } else {
-                    Vec3::ZERO
-                };
-                let own = emitted
-                    + exitant.irradiance[parent] * (element.reflectance + light.faint[element.material as usize]);
-                exitant.radiosity.push(own);
-                exitant.range.push([own, own]);
-                exitant.facing.push(element.facing);
-                exitant.irradiance.push(exitant.irradiance[parent]);
-                exitant.indirect.push(0.0);
-                exitant.directional.push(exitant.directional[parent]);
-                exitant.reflected_as.push(exitant.reflected_as[parent]);
-                exitant.peak.push(0.0);
-                exitant.gain.push(exitant.gain[parent]);
-                light.reflected.push(L::Exitant::default());
-            }
-        }
+        verdict.split(*pair).into_iter().for_each(|node| light.split(node));
     }
 }
 
@@ -397,11 +409,7 @@ fn decide<L: LightField>(
     }
     // What a bent leaf reflects toward the eye differs over it more than one distribution can tell.
     let bent = r.active && r.is_patch() && r.normals.angle() > MOST_BENT;
-    if bent
-        && weight * interval.most > tolerance.error
-        && (r.child_count > 0 || r.radius > tolerance.smallest)
-        && !stopped
-    {
+    if bent && weight * interval.most > tolerance.error && can_split(r, tolerance) && !stopped {
         return Verdict::SplitReceiver;
     }
     if by_bounds > tolerance.error {
@@ -416,8 +424,22 @@ fn decide<L: LightField>(
         let partial = link.visibility > 0.0 && link.visibility < 1.0;
         if partial && stake(link) > tolerance.error { split(choose(light, pair, tolerance, false)) } else { None }
     };
+    // What corners of the receiver tell of a shadow's edge, which segments from all over it miss or take for a soft one.
+    let split_by_edge = |link: &Link| {
+        let (brought, splittable) = (estimate(light, link), r.is_patch() && can_split(r, tolerance));
+        let seen = stake(link) > tolerance.shadow && shadows::counts(light, pair.receiver, brought);
+        if link.visibility < 0.0 || !splittable || !seen || stopped {
+            return None;
+        }
+        let (edge, rays) = shadows::edge(light, pair.receiver, pair.sender);
+        counters.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
+        let found = stake(link) * edge > tolerance.shadow;
+        counters.edges.fetch_add(u64::from(found), Ordering::Relaxed);
+        found.then_some(Verdict::SplitReceiver)
+    };
     if let Some(link) = candidate.own() {
-        return split_by_shadow(&link).unwrap_or(Verdict::Keep(link));
+        let by_edge = || if tolerance.kept_too { split_by_edge(&link) } else { None };
+        return split_by_shadow(&link).or_else(by_edge).unwrap_or(Verdict::Keep(link));
     }
     // A faint link's factor need not be accurate; no later pass renews it.
     let relative = (FACTOR_SHARE * tolerance.error / (weight * interval.most).max(f32::MIN_POSITIVE))
@@ -463,7 +485,7 @@ fn decide<L: LightField>(
             return verdict;
         }
     }
-    Verdict::Keep(link)
+    split_by_edge(&link).unwrap_or(Verdict::Keep(link))
 }
 
 /// A node and itself: parts of a convex surface never see each other, parts of anything else may.
@@ -482,6 +504,12 @@ fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Toleranc
     if at_stake > tolerance.error && splittable && !stopped { Verdict::SplitBoth } else { Verdict::Facing }
 }
 
+/// Whether an element has parts, or may get some.
+pub(crate) fn can_split(element: &Element, tolerance: Tolerance) -> bool {
+    element.kind == Kind::Cluster
+        || element.is_patch() && (element.child_count > 0 || element.radius > tolerance.smallest)
+}
+
 /// Which of the two to split: the larger one, or the sender where its radiosity is what is uncertain.
 fn choose<L: LightField>(
     light: Light<'_, L>,
@@ -490,10 +518,8 @@ fn choose<L: LightField>(
     prefer_sender: bool,
 ) -> Option<Verdict> {
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
-    let can_split =
-        |e: &Element| e.kind == Kind::Cluster || e.is_patch() && (e.child_count > 0 || e.radius > tolerance.smallest);
     // A sphere looks the same from everywhere: where it is evenly lit, its parts tell nothing new.
-    let (receiver, sender) = (can_split(r), can_split(s) && (prefer_sender || !s.whole_sphere));
+    let (receiver, sender) = (can_split(r, tolerance), can_split(s, tolerance) && (prefer_sender || !s.whole_sphere));
     match (receiver, sender) {
         (false, false) => None,
         (true, false) => Some(Verdict::SplitReceiver),
@@ -538,7 +564,7 @@ fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) ->
 }
 
 /// Irradiance that a link would carry unoccluded (max channel).
-fn estimate<L: LightField>(light: Light<'_, L>, link: &Link) -> f32 {
+pub(crate) fn estimate<L: LightField>(light: Light<'_, L>, link: &Link) -> f32 {
     let away = -light.direction_to(light.element(link.receiver).center, link.sender);
     light.emitted(link.sender, away).max_element() * link.factor
 }

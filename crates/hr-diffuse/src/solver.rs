@@ -16,6 +16,7 @@ use crate::reflect::Senders;
 use crate::relight::Linked;
 use crate::residual::{RAYS_PER_LEAF, residual};
 use crate::resume::{Unfinished, is_worth};
+use crate::shadows;
 use crate::shooting::Shot;
 use crate::skips::Skips;
 use crate::stats::Stats;
@@ -31,6 +32,9 @@ use std::time::Instant;
 
 /// A link may be wrong by this share of a pass's tolerance, times the mean irradiance.
 const LINK_SHARE: f32 = 0.07;
+/// Irradiance × importance × √(share of all area) that may be there on one side of a shadow's edge in a leaf and not on the other,
+/// as a share of the error asked for times the mean irradiance.
+const SHADOW_SHARE: f32 = 0.025;
 /// Elements are not split below this share of the tolerance's square root: features smaller than that are not resolved.
 const SMALLEST_SHARE: f32 = 0.008;
 /// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
@@ -146,6 +150,8 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) gather: Gather,
     /// Whether it is known for these links as well as it can be.
     pub(crate) prepared: bool,
+    /// Whether the edges of shadows were looked for in all links there are.
+    edges_known: bool,
     /// What of it stays known for the next links.
     pub(crate) kept_weights: Option<KeptWeights>,
     /// What has links.
@@ -235,6 +241,7 @@ impl<L: LightField> Solver<L> {
             unfinished: Unfinished::new(Vec::new()),
             gather: Gather::default(),
             prepared: false,
+            edges_known: false,
             kept_weights: None,
             linked: Linked::default(),
             faint,
@@ -470,8 +477,15 @@ impl<L: LightField> Solver<L> {
     /// Refines all links to a tolerance.
     fn refine(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let start = Instant::now();
+        let mean = self.mean_irradiance();
         let tolerance = Tolerance {
-            error: LINK_SHARE * pass.tolerance * self.mean_irradiance(),
+            error: LINK_SHARE * pass.tolerance * mean,
+            shadow: if pass.closely || self.edges_known {
+                SHADOW_SHARE * self.settings.error * mean
+            } else {
+                f32::INFINITY
+            },
+            kept_too: !self.edges_known,
             area: self.area,
             smallest: SMALLEST_SHARE * pass.tolerance.sqrt(),
             skips: self.skips,
@@ -498,8 +512,20 @@ impl<L: LightField> Solver<L> {
         });
         *stopped |= refined.stopped;
         self.stats.spent = self.stats.spent.or(refined.spent);
+        self.links = Links::new(refined.links, light.elements.nodes.len());
+        if refined.edges > 0 && !refined.stopped && refined.spent.is_none() {
+            let (account, links) = (&self.account, self.links.all().len() as u64);
+            self.stats.rays += shadows::sew(&mut light, &self.links, tolerance, &mut |nodes| {
+                *stopped = *stopped
+                    || watch(&Progress { phase: Phase::Refine, fraction: pass.fraction(0.6), error, links, nodes })
+                        .is_break();
+                let over = *stopped || account.is_late() || account.is_full::<L>(nodes, links);
+                if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
+        }
+        self.edges_known |= pass.closely && !*stopped && self.stats.spent.is_none();
         let count = self.elements.nodes.len();
-        self.links = Links::new(refined.links, count);
+        self.links.grow(count);
         self.prepared = false;
         self.unfinished.unlit = refined.unlit;
         self.unfinished.coarse.extend(refined.coarse);

@@ -69,6 +69,14 @@ impl Output {
         }
         Ok(Self::Window)
     }
+
+    /// How glossy light is shown best in it: pixel by pixel where each is computed once, or else in a way that follows the eye.
+    fn mode(&self) -> Mode {
+        match self {
+            Self::Image(_) | Self::Frames(_) => Mode::Samples,
+            Self::Html(_) | Self::Export(_) | Self::Window => Mode::Distributions,
+        }
+    }
 }
 
 /// Whether the folder that a file is to be written to is there.
@@ -86,6 +94,7 @@ fn make_folder(folder: &Path) -> Result<(), SceneError> {
 /// What there is to show, and how.
 struct Show<'a> {
     args: &'a Args,
+    mode: Mode,
     solved: &'a Solved,
     accuracy: Accuracy,
     progress: &'a Progress,
@@ -119,6 +128,7 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
         },
         output => (output, None),
     };
+    let mode = args.mode.unwrap_or_else(|| output.mode());
     let scene = load(args, &progress)?;
     if let Some(why) = why {
         progress.say(&format!("{why}; writing frames to {FALLBACK_FRAMES} instead"));
@@ -129,7 +139,7 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
         None => {
             let begun = args.resume.as_deref().map(|path| solution_file::load(path, Arc::clone(&scene))).transpose()?;
             // What is kept is for every mode.
-            solve(scene, begun, args, args.mode == Mode::Distributions || args.save.is_some(), &progress)?
+            solve(scene, begun, args, mode == Mode::Distributions || args.save.is_some(), &progress)?
         }
     };
     if let Some(path) = &args.save {
@@ -137,7 +147,7 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
         solution_file::save(path, &solved, accuracy)?;
     }
     let begin = progress.elapsed();
-    let show = Show { args, solved: &solved, accuracy, progress: &progress, loaded, begin };
+    let show = Show { args, mode, solved: &solved, accuracy, progress: &progress, loaded, begin };
     match output {
         Output::Image(file) => show.image(&file),
         Output::Html(file) => show.html(&file),
@@ -225,7 +235,7 @@ impl Show<'_> {
     }
 
     fn caster(&self) -> RayCaster<'_> {
-        RayCaster::new(&self.solved.scene, &self.solved.solution, self.args.mode)
+        RayCaster::new(&self.solved.scene, &self.solved.solution, self.mode)
     }
 
     /// What `--stats` asks for, up to now.

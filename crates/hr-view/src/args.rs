@@ -38,9 +38,9 @@ pub struct Args {
     #[arg(long, value_name = "FILE.json")]
     pub path: Option<PathBuf>,
 
-    /// How glossy light is shown
-    #[arg(long, value_name = "M", value_enum, default_value_t)]
-    pub mode: Mode,
+    /// How glossy light is shown [default: samples for --image and --frames, distributions for what is walked through]
+    #[arg(long, value_name = "M", value_enum)]
+    pub mode: Option<Mode>,
 
     /// The accuracy asked for: relative error of the solution, 0.001 to 1
     #[arg(long, value_name = "E", value_parser = error, default_value_t = 0.1, allow_negative_numbers = true)]
@@ -105,10 +105,10 @@ impl Args {
             }
             Err(error) => return Err(ViewError::Arguments(one_line(&error))),
         };
-        if args.html.is_some() && args.mode != Mode::Distributions {
+        if args.html.is_some() && args.mode.is_some_and(|mode| mode != Mode::Distributions) {
             return Err(ViewError::Arguments("--html shows distributions; leave --mode out".into()));
         }
-        if args.mode == Mode::Gather && args.image.is_none() && args.frames.is_none() {
+        if args.mode == Some(Mode::Gather) && args.image.is_none() && args.frames.is_none() {
             return Err(ViewError::Arguments("--mode gather is for stills; add --image or --frames".into()));
         }
         Ok(Parsed::Run(Box::new(args)))
@@ -179,7 +179,7 @@ mod tests {
     fn everything_has_its_place() {
         let nothing = run("");
         assert_eq!(nothing.scene, hr_scene::builtin::DEFAULT, "no scene is the default scene");
-        assert_eq!(nothing.mode, Mode::Distributions, "the paper's mode is the default");
+        assert_eq!(nothing.mode, None, "it depends on what is asked for");
         let all = run(
             "a.mgf --camera c.json --image o.exr --mode samples --error 0.02 --transport shoot --time-budget 10 --threads 3 \
              --stats s.json",
@@ -187,11 +187,11 @@ mod tests {
         assert_eq!(all.scene, "a.mgf", "scene");
         assert_eq!(all.camera, Some("c.json".into()), "camera");
         assert_eq!(all.image, Some("o.exr".into()), "image");
-        assert_eq!(all.mode, Mode::Samples, "mode");
+        assert_eq!(all.mode, Some(Mode::Samples), "mode");
         assert_eq!((all.error, all.time_budget, all.threads), (0.02, Some(10.0), Some(3)), "numbers");
         assert_eq!((all.transport, nothing.transport), (Transport::Shoot, Transport::default()), "transport");
         assert_eq!(all.stats, Some("s.json".into()), "stats");
-        assert_eq!(run("--mode gather --image o.exr").mode, Mode::Gather, "stills by a final gather");
+        assert_eq!(run("--mode gather --image o.exr").mode, Some(Mode::Gather), "stills by a final gather");
         assert_eq!(run("--save s.hrs").save, Some("s.hrs".into()), "save");
         assert_eq!(run("room --load s.hrs --threads 2").load, Some("s.hrs".into()), "load");
         assert_eq!(run("--export light.glb").export, Some("light.glb".into()), "export");

@@ -272,7 +272,7 @@ impl Session {
         let settings = Settings { error, budget, transport: self.args.transport };
         // Mirrors are shown by their distributions in any mode; what is kept is for every mode.
         let mirrors = || scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
-        let wants_distributions = self.args.mode == Mode::Distributions || self.args.save.is_some() || mirrors();
+        let wants_distributions = self.mode() == Mode::Distributions || self.args.save.is_some() || mirrors();
         let begun = self.begun.take();
         self.interrupt = Some(Interrupt::listen());
         let ask = &mut |state: &hr_diffuse::Progress| match self.attend(state) {
@@ -299,11 +299,15 @@ impl Session {
         self.show(solved, accuracy)
     }
 
+    fn mode(&self) -> Mode {
+        self.args.mode.unwrap_or_default()
+    }
+
     fn show(&mut self, solved: Solved, accuracy: Accuracy) -> Result<(), ViewError> {
         self.begin("making triangles");
         let begin = Instant::now();
         let solved = Arc::new(solved);
-        let walkthrough = Walkthrough::new(Arc::clone(&solved), self.args.mode);
+        let walkthrough = Walkthrough::new(Arc::clone(&solved), self.mode());
         self.screen.show(Arc::new(walkthrough)).map_err(window::WindowError::from)?;
         self.status.shown = Some(accuracy.believed);
         self.has_shown = true;

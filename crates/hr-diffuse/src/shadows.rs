@@ -1,0 +1,117 @@
+//! Shadows: leaves are split along the edges of shadows that can be seen.
+//!
+//! The error that a solution may have is a share of all light, and a few segments between two elements miss what covers a
+//! corner of one. An edge that one leaf notices and the next does not looks torn, however little light that is. So the corners
+//! of a leaf look at whatever brings much of its light: where some see it and others do not, there is an edge in between.
+
+use crate::hooks::LightField;
+use crate::links::Links;
+use crate::reconstruct::{Corner, INSET, lay_out, point_on};
+use crate::refine::{MutableLight, Tolerance, can_split, estimate};
+use crate::segments::visibility_at;
+use crate::threads::prelude::*;
+use crate::transport::Light;
+use glam::Vec2;
+use std::ops::ControlFlow;
+
+/// Senders bring much of a receiver's light if it is more than this share.
+const MUCH: f32 = 0.1;
+/// Segments from each corner and the middle of a leaf, which go to the same points of the sender.
+const SEGMENTS: u32 = 4;
+/// Where no corner sees more of the sender by this share than another one does, the shadow is soft: interpolation shows it as
+/// well as smaller leaves would.
+const SOFT: f32 = 0.5;
+
+/// Whether irradiance that may come from a sender (max channel) is much of what a receiver has.
+pub(crate) fn counts<L: LightField>(light: Light<'_, L>, receiver: u32, irradiance: f32) -> bool {
+    irradiance > MUCH * light.exitant.irradiance[receiver as usize].max_element()
+}
+
+/// How much more of a sender one corner of a part of a surface sees than another one does (0…1), 0 where that is a soft shadow;
+/// and the rays that were shot for it.
+pub(crate) fn edge<L: LightField>(light: Light<'_, L>, receiver: u32, sender: u32) -> (f32, u32) {
+    let element = light.element(receiver);
+    let geometry = &light.scene.surfaces()[element.source as usize];
+    let corners = geometry.corners(element.domain).into_iter().chain([geometry.middle(element.domain)]);
+    between(light, receiver, sender, corners)
+}
+
+/// The same between any places of it.
+fn between<L: LightField>(
+    light: Light<'_, L>,
+    receiver: u32,
+    sender: u32,
+    places: impl Iterator<Item = Vec2>,
+) -> (f32, u32) {
+    let element = light.element(receiver);
+    let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
+    let (mut least, mut most, mut rays) = (1.0_f32, 0.0_f32, 0);
+    for uv in places {
+        let (x, n) = point_on(light.scene, light.elements, receiver, uv.lerp(middle, INSET));
+        // The same points of the sender for all.
+        let seen = visibility_at(light, (x, n, element.source), sender, SEGMENTS, receiver);
+        (least, most, rays) = (least.min(seen), most.max(seen), rays + SEGMENTS);
+    }
+    let difference = most - least;
+    (if difference > SOFT { difference } else { 0.0 }, rays)
+}
+
+/// Splits leaves beside which there are smaller ones that found an edge, where it reaches into them between two corners: else
+/// what is dark there would be drawn out across them. `watch` is told how many elements there are; once it breaks, no more are
+/// split. Returns the rays that were shot.
+pub(crate) fn sew<L: LightField>(
+    light: &mut MutableLight<'_, L>,
+    links: &Links,
+    tolerance: Tolerance,
+    watch: &mut dyn FnMut(u64) -> ControlFlow<()>,
+) -> u64 {
+    let mut rays = 0;
+    loop {
+        let (reader, vertices) = (light.read(), lay_out(light.scene, light.elements));
+        let leaves: Vec<u32> = reader.elements.patch_leaves().collect();
+        let look = |&leaf: &u32| {
+            let (torn, rays) = is_torn(reader, links, tolerance, leaf, vertices.fan(leaf));
+            (torn.then_some(leaf), u64::from(rays))
+        };
+        let looked: Vec<(Option<u32>, u64)> = leaves.par_iter().with_min_len(64).map(look).collect();
+        rays += looked.iter().map(|(_, rays)| rays).sum::<u64>();
+        let torn: Vec<u32> = looked.into_iter().filter_map(|(leaf, _)| leaf).collect();
+        if torn.is_empty() || watch(light.elements.nodes.len() as u64).is_break() {
+            return rays;
+        }
+        torn.into_iter().for_each(|leaf| light.split(leaf));
+    }
+}
+
+/// Whether the edge of a shadow reaches into a leaf where smaller ones touch it, and the rays that were shot to know.
+fn is_torn<L: LightField>(
+    light: Light<'_, L>,
+    links: &Links,
+    tolerance: Tolerance,
+    leaf: u32,
+    fan: &[Corner],
+) -> (bool, u32) {
+    let element = light.element(leaf);
+    let corners = light.scene.surfaces()[element.source as usize].corners(element.domain).len();
+    if fan.len() <= 1 + corners || element.importance <= 0.0 || !can_split(element, tolerance) {
+        return (false, 0);
+    }
+    let weight = element.importance * (element.area / tolerance.area).sqrt();
+    let (mut node, mut rays) = (leaf, 0);
+    loop {
+        for link in links.of(node).iter().filter(|link| link.visibility >= 0.0) {
+            let brought = estimate(light, link);
+            if weight * brought > tolerance.shadow && counts(light, leaf, brought) {
+                let (edge, shot) = between(light, leaf, link.sender, fan.iter().map(|corner| corner.uv));
+                rays += shot;
+                if weight * brought * edge > tolerance.shadow {
+                    return (true, rays);
+                }
+            }
+        }
+        if node == 0 {
+            return (false, rays);
+        }
+        node = light.element(node).parent;
+    }
+}
