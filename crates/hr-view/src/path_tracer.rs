@@ -259,6 +259,32 @@ impl<'a> PathTracer<'a> {
         light
     }
 
+    /// Radiance that the glossy part of a surface's BRDF reflects back against the unit `direction` where it was hit: the light
+    /// of one emitter, drawn by a pair of random numbers each for which and where, and the mean along rays within the lobe, drawn
+    /// by one pair each, of what is emitted where they end, and what is reflected there, as `beyond` tells. Whichever way
+    /// finds an emitter rarely counts for little (multiple importance sampling).
+    pub fn glossy(
+        &self,
+        hit: &Hit,
+        direction: Vec3,
+        [choice, place]: [Vec2; 2],
+        turns: &[Vec2],
+        beyond: &mut dyn FnMut(&Hit, Vec3) -> Rgb,
+    ) -> Rgb {
+        let Some(point) = self.point(hit, direction) else { return Rgb::ZERO };
+        let point = Point { diffuse: Rgb::ZERO, chances: [0.0, 1.0, 0.0], ..point };
+        let mut light = self.direct(&point, choice.x, place, choice.y);
+        for turn in turns {
+            let Some(step) = point.step(0.0, *turn) else { continue };
+            let met = self.visibility.closest_except(point.position, step.direction, START, f32::MAX, point.surface);
+            let Some(met) = met else { continue };
+            let other = self.emitters.density(met.surface, met.t, -met.normal.dot(step.direction));
+            let emitted = self.emitted(&met) * power_heuristic(step.density, other);
+            light += step.weight * (emitted + beyond(&met, step.direction)) / turns.len() as f32;
+        }
+        light
+    }
+
     /// Radiance that a surface emits where it was hit.
     fn emitted(&self, hit: &Hit) -> Rgb {
         let exitance = self.scene.materials[self.scene.surfaces[hit.surface as usize].material as usize].exitance;

@@ -18,7 +18,7 @@ use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
 /// Rays that follow a narrow lobe, per ray of the pixel.
-const LOBE_RAYS: u32 = 6;
+const LOBE_RAYS: usize = 6;
 /// Mirrors in mirrors end here.
 const MOST_BOUNCES: u32 = 4;
 /// Paths of a final gather, for every ray of the other modes. With the grid of stills 63 per pixel, 4032 per 8 × 8 block:
@@ -37,8 +37,8 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     mode: Mode,
     /// Rays per pixel are this squared.
     grid: u32,
-    /// Of a final gather.
-    tracer: Option<PathTracer<'a>>,
+    /// For final gathers, and for what is in narrow lobes.
+    tracer: PathTracer<'a>,
 }
 
 /// A point that a ray met.
@@ -56,7 +56,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// For a scene and its solution.
     #[must_use]
     pub fn new(scene: &'a Scene, solution: &'a Solution<GlossyField<B>>, mode: Mode) -> Self {
-        let tracer = (mode == Mode::Gather).then(|| PathTracer::new(scene, &solution.scene.visibility));
+        let tracer = PathTracer::new(scene, &solution.scene.visibility);
         Self { scene, solution, mode, grid: 3, tracer }
     }
 
@@ -69,8 +69,11 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// The image that a camera takes: linear radiance, W/(m² sr). `watch` is told the share that is done.
     #[must_use]
     pub fn render(&self, camera: &Camera, watch: &(dyn Fn(f32) + Sync)) -> Image {
-        if let Some(tracer) = &self.tracer {
-            return tracer.render_until(&|ray| self.end(ray), camera, self.grid * self.grid * GATHERED, 0, watch).image;
+        if self.mode == Mode::Gather {
+            return self
+                .tracer
+                .render_until(&|ray| self.end(ray), camera, self.grid * self.grid * GATHERED, 0, watch)
+                .image;
         }
         let mut image = Image::new(camera.width, camera.height);
         let width = camera.width as usize;
@@ -194,16 +197,18 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         }
         if met.reflector.lobe(outgoing).width < FOLLOWED {
             let turn = unit(hash(seed, 12));
-            for i in 0..LOBE_RAYS {
-                let u = point2(hash(seed, 13), i);
-                let u = Vec2::new((u.x + turn).fract(), (u.y + i as f32) / LOBE_RAYS as f32).fract();
-                if let Some(sample) = met.reflector.sample(outgoing, u).filter(|s| s.weight.is_finite()) {
-                    let direction = place.frame * sample.incident;
-                    let seen = self.along(met, direction, bounce, hash(seed, 14 + i), scratch);
-                    light += sample.weight * seen / LOBE_RAYS as f32;
-                }
-            }
-            return light;
+            let turns: [Vec2; LOBE_RAYS] = std::array::from_fn(|i| {
+                let u = point2(hash(seed, 13), i as u32);
+                Vec2::new((u.x + turn).fract(), (u.y + i as f32) / LOBE_RAYS as f32).fract()
+            });
+            let pairs = [14, 15].map(|pair| point2(hash(seed, pair), 0));
+            let mut number = 0;
+            let mut beyond = |hit: &Hit, direction| {
+                number += 1;
+                let Some(leaf) = self.solution.leaf(hit) else { return Rgb::ZERO };
+                self.leaving(*hit, leaf, direction, bounce + 1, hash(seed, 15 + number), scratch)
+            };
+            return light + self.tracer.glossy(&met.hit, -met.away, pairs, &turns, &mut beyond);
         }
         light + glossy::reflected(self.solution, &*met.reflector, met.leaf, &place, met.away, 0.0, scratch)
     }
