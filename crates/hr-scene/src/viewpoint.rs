@@ -5,7 +5,7 @@ mod sight;
 use crate::camera::unit;
 use crate::{Camera, Scene};
 use glam::DVec3;
-use hr_diffuse::{Shape, Surface};
+use hr_diffuse::Shape;
 use sight::Sight;
 use std::f64::consts::{PI, TAU};
 
@@ -366,6 +366,7 @@ mod tests {
     use super::*;
     use crate::builtin;
     use crate::builtin::tests::grey;
+    use hr_diffuse::Surface;
 
     fn without_cameras(name: &str) -> Scene {
         let mut scene = builtin::scene(name).expect("a built-in scene");
