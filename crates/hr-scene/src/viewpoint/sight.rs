@@ -15,8 +15,8 @@ const MOST_LAMPS: usize = 16;
 const UNLIT: f64 = 0.1;
 /// What the face of a lamp is worth: light, but nothing to look at.
 const LAMP: f64 = 0.5;
-/// What is this near the eye, as a share of the distance to what is looked at, is worth half.
-const NEAR: f64 = 0.3;
+/// What is this near the eye, as a share of the distance to what is looked at, is worth half: wide views are better.
+const NEAR: f64 = 1.0;
 /// Rays begin and end this far from surfaces, unit space.
 const GAP: f32 = 1e-5;
 
