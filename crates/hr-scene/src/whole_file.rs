@@ -9,10 +9,16 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The contents of a regular file; others might never end.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("not a regular file"));
-    }
+    is_regular(&fs::metadata(path)?)?;
     fs::read(path)
+}
+
+fn is_regular(found: &fs::Metadata) -> io::Result<()> {
+    match found {
+        found if found.is_file() => Ok(()),
+        found if found.is_dir() => Err(io::Error::other("this is a folder; give a file")),
+        _ => Err(io::Error::other("not a regular file")),
+    }
 }
 
 /// As [`read`], with an error that names the file.
@@ -32,9 +38,7 @@ pub fn read_words(path: &Path) -> Result<(Vec<u64>, u64), SceneError> {
     let read = || {
         let mut file = File::open(path)?;
         let found = file.metadata()?;
-        if !found.is_file() {
-            return Err(io::Error::other("not a regular file"));
-        }
+        is_regular(&found)?;
         let length = usize::try_from(found.len()).map_err(io::Error::other)?;
         let mut words = vec![0_u64; length.div_ceil(size_of::<u64>())];
         let bytes = &mut bytemuck::cast_slice_mut(&mut words)[..length];
