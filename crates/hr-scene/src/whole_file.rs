@@ -202,7 +202,7 @@ mod tests {
         write_whole(&path, |out| out.write_all(b"all")).expect("written");
         assert_eq!(read_whole(&path).expect("there"), b"all", "its contents");
         let error = read_whole(&folder.path("")).expect_err("a folder").to_string();
-        assert!(error.ends_with("not a regular file"), "'{error}'");
+        assert!(error.ends_with("this is a folder; give a file"), "'{error}'");
         if cfg!(unix) {
             let error = read(Path::new("/dev/zero")).expect_err("it has no end").to_string();
             assert_eq!(error, "not a regular file", "refused at once");
