@@ -501,7 +501,6 @@ mod tests {
             let camera = scene.default_camera();
             camera.check(name).expect("usable");
             let seen = Sight::of(&scene).seen(&camera);
-            println!("{name}: {seen:.2} {:?} {:?}", camera.eye, camera.target);
             assert!(seen >= least, "{name}: {seen} of {camera:?}");
         }
         let along = lit(tube(300.0)).default_camera().frame().2.x.abs();

@@ -43,10 +43,11 @@ impl Haar {
     /// # Errors
     /// Where it is anything else.
     pub fn restore(from: &mut Reader<'_>) -> Result<Vec<Self>, FlatError> {
-        let heads: &[Head] = from.view(WHAT)?;
-        let (mut vertices, mut nodes): (&[Half3], &[Node]) = (from.view(WHAT)?, from.view(WHAT)?);
+        let heads: Vec<Head> = from.take(WHAT)?;
+        let (vertices, nodes): (Vec<Half3>, Vec<Node>) = (from.take(WHAT)?, from.take(WHAT)?);
+        let (mut vertices, mut nodes) = (vertices.as_slice(), nodes.as_slice());
         let mut parts = Vec::with_capacity(heads.len());
-        for head in heads {
+        for head in &heads {
             parts.push((head, split_off(&mut vertices, head.vertices)?, split_off(&mut nodes, head.nodes)?));
         }
         fits(vertices.is_empty() && nodes.is_empty(), WHAT)?;
