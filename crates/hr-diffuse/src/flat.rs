@@ -99,6 +99,46 @@ impl<'a> Reader<'a> {
         Ok(array)
     }
 
+    /// Reads an array as groups of these lengths, one after the other.
+    ///
+    /// # Errors
+    /// As [`take`](Self::take), and where lengths do not add up to that of the array.
+    pub fn take_groups<T: CheckedBitPattern>(
+        &mut self,
+        lengths: impl IntoIterator<Item = u32>,
+        what: &'static str,
+    ) -> Result<Vec<Vec<T>>, FlatError> {
+        let mut lengths = lengths.into_iter().map(|length| length as usize);
+        let mut groups: Vec<Vec<T>> = Vec::with_capacity(lengths.size_hint().0);
+        // Entries that the last group still lacks, and the array after it.
+        let mut lacks = 0;
+        let mut unread = None;
+        self.pieces(what, |count, mut piece: &[T]| {
+            let unread = unread.get_or_insert(count);
+            loop {
+                let (taken, after) = piece.split_at(lacks.min(piece.len()));
+                if let Some(group) = groups.last_mut() {
+                    group.extend_from_slice(taken);
+                }
+                (lacks, piece) = (lacks - taken.len(), after);
+                *unread -= taken.len();
+                if piece.is_empty() {
+                    return Ok(());
+                }
+                lacks = lengths.next().filter(|length| *length <= *unread).ok_or(FlatError::Misfit(what))?;
+                groups.push(Vec::with_capacity(lacks));
+            }
+        })?;
+        // Groups after the last entry are empty.
+        let whole = lacks == 0
+            && lengths.all(|length| {
+                groups.push(Vec::new());
+                length == 0
+            });
+        fits(whole, what)?;
+        Ok(groups)
+    }
+
     /// Hands on an array in pieces, each with the number of entries of all of it.
     fn pieces<T: CheckedBitPattern>(
         &mut self,
@@ -227,6 +267,26 @@ mod tests {
         let mut short = &bytes[..8];
         let found = Reader::new(&mut short, bytes.len() as u64).take::<f32>("light");
         assert_eq!(found, Err(FlatError::Ends("light")), "cut off");
+    }
+
+    #[test]
+    fn groups_come_back() {
+        let numbers: Vec<u16> = (0..=u16::MAX).cycle().take(PIECE).collect();
+        let bytes = written(|out| out.put(&numbers));
+        let rest = numbers.len() as u32 - 9;
+        for lengths in [vec![0, 4, 0, 5, rest, 0, 0], vec![rest, 9], vec![1; numbers.len()]] {
+            let groups = read(&bytes, |from| from.take_groups::<u16>(lengths.iter().copied(), "groups"));
+            let groups = groups.expect("they add up");
+            assert!(groups.iter().map(Vec::len).eq(lengths.iter().map(|n| *n as usize)), "their lengths");
+            assert!(groups.concat() == numbers, "what is in them");
+        }
+        for lengths in [vec![], vec![4, 4], vec![rest, 10], vec![u32::MAX, 3], vec![rest, 9, 1]] {
+            let found = read(&bytes, |from| from.take_groups::<u16>(lengths, "groups"));
+            assert_eq!(found.map(|_| ()), Err(FlatError::Misfit("groups")), "they do not add up");
+        }
+        let none = written(|out| out.put::<u16>(&[]));
+        let found = read(&none, |from| from.take_groups::<u16>([0, 0], "groups"));
+        assert_eq!(found, Ok(vec![vec![], vec![]]), "nothing in two groups");
     }
 
     #[test]
