@@ -6,5 +6,6 @@ mod edits;
 mod furnace;
 mod hooks;
 mod invariance;
+mod moved;
 mod scenes;
 mod shooting;

@@ -20,17 +20,10 @@ impl Keep for GlossyField {
 
     fn restore(&self, nodes: usize, from: &mut Reader<'_>) -> Result<KeptLight<Self>, FlatError> {
         self.counters().take_over(from.take_exactly("counts")?);
-        let (lengths, samples): (&[u32], &[IlluminationSample]) = (from.view(SAMPLES)?, from.view(SAMPLES)?);
+        let lengths: Vec<u32> = from.take(SAMPLES)?;
+        let incident: Vec<SampleSet> = from.take_groups(lengths, SAMPLES)?;
         let is_sound = |sample: &IlluminationSample| sample.sender().index() < nodes && sample.irradiance().is_finite();
-        fits(samples.iter().all(is_sound), SAMPLES)?;
-        let mut rest = samples;
-        let mut incident: Vec<SampleSet> = Vec::with_capacity(lengths.len());
-        for &length in lengths {
-            let (set, after) = rest.split_at_checked(length as usize).ok_or(FlatError::Misfit(SAMPLES))?;
-            incident.push(set.to_vec());
-            rest = after;
-        }
-        fits(rest.is_empty(), SAMPLES)?;
+        fits(incident.iter().flatten().all(is_sound), SAMPLES)?;
         Ok((incident, Haar::restore(from)?))
     }
 }

@@ -1,5 +1,6 @@
 //! Errors of scene files: what is wrong, where, and what would be right.
 
+use crate::Warning;
 use std::path::PathBuf;
 
 /// Why a scene could not be loaded or a file not be written.
@@ -25,10 +26,12 @@ pub enum SceneError {
         mend: String,
     },
     /// There is nothing to light.
-    #[error("{name}: the scene has no surface; add at least one face or curved surface of non-zero area")]
+    #[error("{name}: the scene has no surface{left_out}; add at least one face or curved surface of non-zero area")]
     Empty {
         /// Scene or file name.
         name: String,
+        /// What was left out and why, in brackets; or nothing.
+        left_out: String,
     },
     /// Neither a file of a known kind nor a built-in scene.
     #[error("'{name}' is neither a .mgf, .gltf, .glb or .obj file nor a built-in scene; built-in scenes: {known}")]
@@ -38,6 +41,15 @@ pub enum SceneError {
         /// The names of the built-in scenes.
         known: String,
     },
+}
+
+impl SceneError {
+    /// [`Empty`](Self::Empty), and what the warnings say of why.
+    pub(crate) fn empty(name: String, warnings: &[Warning]) -> Self {
+        let told: Vec<_> = warnings.iter().map(|w| format!("{} ({})", w.text, w.first)).collect();
+        let left_out = if told.is_empty() { String::new() } else { format!(" ({})", told.join(", ")) };
+        Self::Empty { name, left_out }
+    }
 }
 
 /// A word of the file in quotes, fit for one line of an error message whatever is in it.

@@ -68,7 +68,7 @@ impl Scene {
         self.drop_unusable_lights_and_cameras(&mut counts);
         self.warnings.extend(counts.0);
         if self.surfaces.is_empty() {
-            return Err(SceneError::Empty { name: self.name });
+            return Err(SceneError::empty(self.name, &self.warnings));
         }
         Ok(self)
     }
@@ -427,9 +427,10 @@ mod tests {
     #[test]
     fn nothing_and_nonsense_are_errors() {
         let error = scene(&[]).finish().expect_err("empty");
-        assert!(matches!(&error, SceneError::Empty { name } if name == "test"), "{error}");
+        assert!(matches!(&error, SceneError::Empty { name, .. } if name == "test"), "{error}");
         let error = scene(&[Shape::Triangle([A, A, A])]).finish().expect_err("nothing is left");
         assert!(matches!(error, SceneError::Empty { .. }), "{error}");
+        assert!(error.to_string().contains("area"), "says what was left out: {error}");
         let mut s = scene(&[Shape::Triangle([A, B, C])]);
         s.surfaces[0].material = 1;
         let error = s.finish().expect_err("no such material").to_string();

@@ -73,7 +73,7 @@ pub(crate) fn from_bytes(bytes: &[u8], path: &Path) -> Result<Scene, SceneError>
     loader.nodes()?;
     let Loader { materials, mut scene, warnings, .. } = loader;
     if scene.surfaces.is_empty() {
-        return Err(SceneError::Empty { name: scene.name });
+        return Err(SceneError::empty(scene.name, &warnings.into_list()));
     }
     materials.apply_means(&mut scene);
     scene.warnings = warnings.into_list();

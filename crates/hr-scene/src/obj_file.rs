@@ -68,7 +68,7 @@ pub(crate) fn from_bytes(bytes: &[u8], path: &Path) -> Result<Scene, SceneError>
         place(&mut scene, &mut warnings, &part, &DMat4::IDENTITY);
     }
     if scene.surfaces.is_empty() {
-        return Err(SceneError::Empty { name: scene.name });
+        return Err(SceneError::empty(scene.name, &warnings.into_list()));
     }
     for (index, mean) in crate::mesh::mean_base_colors(&scene).into_iter().enumerate() {
         let key = materials.iter().find(|(_, m)| **m as usize == index).map(|(key, _)| *key);

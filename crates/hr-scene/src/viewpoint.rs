@@ -1,21 +1,28 @@
 //! Where to stand and where to walk in a scene: a camera for files without one, and the walkthrough's path.
 
+mod sight;
+
 use crate::camera::unit;
-use crate::{Camera, Rgb, Scene};
+use crate::{Camera, Scene};
 use glam::DVec3;
-use hr_diffuse::{Shape, Surface};
+use hr_diffuse::Shape;
+use sight::Sight;
 use std::f64::consts::{PI, TAU};
 
 /// Eye height as a share of a room's height: 1.6 m of 2.6 m.
 const EYE_HEIGHT: f64 = 0.62;
-/// How far from the corner of a room its default camera stands, as a share of length and width.
-const CORNER_INSET: f64 = 0.14;
-/// Shares of length and width at which a place inside of a room is looked for.
-const PLACES: [f64; 5] = [0.5, 0.32, 0.68, 0.15, 0.85];
-/// Share of all directions that must end on a surface for a scene to count as a closed room.
+/// Shares of length and width at which a place inside of a room is looked for: near the corners first.
+const PLACES: [f64; 5] = [0.14, 0.86, 0.32, 0.68, 0.5];
+/// Share of all directions that must end on a surface for a place to count as within something.
+const WITHIN: f64 = 0.5;
+/// The same for a closed room.
 const CLOSED: f64 = 0.9;
-/// Rays are cast against so many of the largest surfaces at most: those that walls are made of.
-const MAX_OCCLUDERS: usize = 20_000;
+/// How much better a view from outside must be to be taken in place of one from inside of a closed room.
+const INSIDE: f64 = 1.5;
+/// Surfaces larger by this factor than all that is smaller are ground, or sky: what stands on it is looked at.
+const GROUND: f64 = 4.0;
+/// Field of view of a default camera across, inside and outside, degrees.
+const FIELDS: [f64; 2] = [70.0, 45.0];
 /// Radius of the walk about a single camera, as a share of the distance to what it looks at.
 const STROLL: f64 = 0.3;
 
@@ -28,7 +35,8 @@ impl Scene {
     }
 
     /// Which way is up: that of the first camera; else +y for glTF files, which say so; else (MGF, OBJ: their files do
-    /// not tell) +y or +z, whichever has more floor and ceiling, that is, polygon area facing along it.
+    /// not tell) +y or +z, whichever has more floor and ceiling, that is, polygon area facing along it. Area of floors that
+    /// no ceiling is opposite to counts twice: walls come in pairs.
     #[must_use]
     pub fn up(&self) -> DVec3 {
         if let Some((_, camera)) = self.cameras.first() {
@@ -38,7 +46,7 @@ impl Scene {
         if name.ends_with(".gltf") || name.ends_with(".glb") {
             return DVec3::Y;
         }
-        let (mut y, mut z) = (0.0, 0.0);
+        let (mut both, mut net) = (DVec3::ZERO, DVec3::ZERO);
         for surface in &self.surfaces {
             let area = match &surface.shape {
                 Shape::Triangle([a, b, c]) => (*b - *a).cross(*c - *a) * 0.5,
@@ -47,75 +55,117 @@ impl Scene {
                 Shape::Sphere { .. } | Shape::Cone { .. } | Shape::Torus { .. } => continue,
             };
             // Only what faces along an axis: slopes and rounded things tell nothing.
-            let facing = area.abs() / area.length();
-            y += if facing.y > 0.95 { area.length() } else { 0.0 };
-            z += if facing.z > 0.95 { area.length() } else { 0.0 };
+            if (area / area.length()).abs().max_element() > 0.95 {
+                both += area.abs();
+                net += if surface.flip { -area } else { area };
+            }
         }
+        let DVec3 { y, z, .. } = both + net.abs();
         if y >= z { DVec3::Y } else { DVec3::Z }
     }
 
-    /// A camera for a scene that brings none: in a closed room at eye height near the corner with the widest view,
-    /// looking to the middle; otherwise from outside, with everything in view. 640 x 400 pixels. Where the scene has
-    /// cameras, it is the first one.
+    /// A camera for a scene that brings none: of some places inside, at eye height, and some around it, with everything in
+    /// view but a wide ground, that from which most can be seen that is lit. In a closed room it is one inside. 640 x 400
+    /// pixels. Where the scene has cameras, it is the first one.
     #[must_use]
     pub fn default_camera(&self) -> Camera {
         if let Some((_, camera)) = self.cameras.first() {
             return *camera;
         }
-        let up = self.up();
-        let (low, high) = self.bounds().unwrap_or((-DVec3::ONE, DVec3::ONE));
-        let center = low + (high - low) * 0.5;
-        let camera = |eye: DVec3, target: DVec3, fov_x| Camera {
-            eye: eye.to_array(),
-            target: target.to_array(),
-            up: up.to_array(),
-            fov_x,
-            width: 640,
-            height: 400,
-        };
-        let occluders = self.occluders();
-        // Height along `up`, the rest across.
-        let at = |share: DVec3| low + (high - low) * share;
-        let place = |across: [f64; 2], height: f64| {
-            at(if up == DVec3::Y {
-                DVec3::new(across[0], height, across[1])
-            } else {
-                DVec3::new(across[0], across[1], height)
-            })
-        };
-        let inside = |p: &DVec3| {
-            let hits = sphere_directions(64).filter(|d| self.is_wall(occluders.nearest(*p, *d))).count();
-            hits as f64 >= CLOSED * 64.0
-        };
-        // Rooms are not always boxes: the middle is the place inside that is nearest to the middle of all.
-        let mut places: Vec<[f64; 2]> =
-            PLACES.into_iter().flat_map(|across| PLACES.map(|along| [across, along])).collect();
-        let off = |p: &[f64; 2]| (p[0] - 0.5).abs().max((p[1] - 0.5).abs());
-        places.sort_by(|a, b| off(a).total_cmp(&off(b)));
-        if let Some(middle) = places.iter().copied().find(|&p| inside(&place(p, EYE_HEIGHT))) {
-            let target = place(middle, 0.4);
-            let view = |eye: &DVec3| {
-                // Free sight along some directions about the middle: a cupboard before the eye shows nothing.
-                let ahead = unit(target - *eye);
-                let free = |d: DVec3| occluders.distance(*eye, d).min((high - low).length());
-                sphere_directions(32).map(|d| free(unit(ahead + 0.6 * d))).sum::<f64>()
-            };
-            let near = CORNER_INSET;
-            let far = 1.0 - near;
-            let corners = [[near, near], [far, near], [near, far], [far, far]].map(|c| place(c, EYE_HEIGHT));
-            let best = corners.into_iter().filter(inside).max_by(|a, b| view(a).total_cmp(&view(b)));
-            // Rooms without corners: the place that is farthest from the middle.
-            let aside = || places.iter().rev().filter(|p| **p != middle).map(|p| place(*p, EYE_HEIGHT)).find(inside);
-            if let Some(eye) = best.or_else(aside) {
-                return camera(eye, target, 70.0);
+        let sight = Sight::of(self);
+        let candidates = self.inside(&sight).into_iter().chain(self.around());
+        // The first of equals, so that those that are named first are preferred.
+        let mut best: Option<(f64, Camera)> = None;
+        for (worth, camera) in candidates {
+            let worth = worth * sight.seen(&camera);
+            if best.as_ref().is_none_or(|(most, _)| worth > *most) {
+                best = Some((worth, camera));
             }
         }
-        // Outside, a little above, far enough for the bounding sphere to fit into the height of the picture.
-        let fov_x = 45.0_f64;
-        let half_height = ((fov_x.to_radians() * 0.5).tan() * 400.0 / 640.0).atan();
-        let radius = ((high - low).length() * 0.5).max(f64::MIN_POSITIVE);
-        let side = if up == DVec3::Y { DVec3::new(0.5, 0.4, 0.8) } else { DVec3::new(0.5, -0.8, 0.4) };
-        camera(center + unit(side) * (radius / half_height.sin()), center, fov_x)
+        best.map_or_else(|| self.camera(DVec3::ONE, DVec3::ZERO, FIELDS[1]), |(_, camera)| camera)
+    }
+
+    fn camera(&self, eye: DVec3, target: DVec3, fov_x: f64) -> Camera {
+        let up = self.up().to_array();
+        Camera { eye: eye.to_array(), target: target.to_array(), up, fov_x, width: 640, height: 400 }
+    }
+
+    /// Views from places within the scene that have surfaces about them, and how much they are preferred.
+    fn inside(&self, sight: &Sight<'_>) -> Vec<(f64, Camera)> {
+        let (low, high) = self.bounds().unwrap_or_default();
+        let up = self.up();
+        let place = |across: f64, along: f64| {
+            let share = if up == DVec3::Y {
+                DVec3::new(across, EYE_HEIGHT, along)
+            } else {
+                DVec3::new(across, along, EYE_HEIGHT)
+            };
+            low + (high - low) * share
+        };
+        let mut views = Vec::new();
+        for eye in PLACES.iter().flat_map(|&across| PLACES.iter().map(move |&along| place(across, along))) {
+            let ends: Vec<DVec3> = sphere_directions(64).filter_map(|d| Some(sight.wall(eye, d)? - eye)).collect();
+            let share = ends.len() as f64 / 64.0;
+            if share < WITHIN {
+                continue;
+            }
+            let worth = if share >= CLOSED { INSIDE } else { 1.0 };
+            let level = |d: DVec3| d - up * d.dot(up);
+            let reach = ends.iter().map(|end| end.length()).sum::<f64>() / ends.len() as f64;
+            // Toward the middle of what there is about the eye, or along it, a little down.
+            let middle = level(ends.iter().sum::<DVec3>() / ends.len() as f64);
+            let along = ends.iter().map(|end| level(*end)).max_by(|a, b| a.length().total_cmp(&b.length()));
+            for ahead in along.into_iter().chain([middle]).filter(|ahead| ahead.length() > 0.1 * reach) {
+                let target = eye + unit(ahead) * reach - up * (0.2 * reach);
+                views.push((worth, self.camera(eye, target, FIELDS[0])));
+            }
+        }
+        views
+    }
+
+    /// Views from outside, far enough for the bounding sphere of what there is to fit into the height of the picture, and
+    /// how much they are preferred.
+    fn around(&self) -> Vec<(f64, Camera)> {
+        let whole = self.bounds().unwrap_or((-DVec3::ONE, DVec3::ONE));
+        let subject = self.subject().unwrap_or(whole);
+        let half_height = ((FIELDS[1].to_radians() * 0.5).tan() * 400.0 / 640.0).atan();
+        let up = self.up();
+        let mut views = Vec::new();
+        for ((low, high), worth) in [(subject, 1.0), (whole, 0.8)] {
+            let center = low + (high - low) * 0.5;
+            let radius = ((high - low).length() * 0.5).max(f64::MIN_POSITIVE);
+            let mut view = |worth: f64, [right, front, above]: [f64; 3]| {
+                let side =
+                    if up == DVec3::Y { DVec3::new(right, above, front) } else { DVec3::new(right, -front, above) };
+                let eye = center + unit(side) * (radius / half_height.sin());
+                views.push((worth, self.camera(eye, center, FIELDS[1])));
+            };
+            // A little above, from the front and from other sides; and if that shows little, level, into what is open
+            // there, steeply, or from below.
+            view(worth, [0.5, 0.8, 0.4]);
+            for (less, height) in [(0.95, 0.4), (0.7, 0.05), (0.7, 1.5), (0.5, -0.4)] {
+                for k in 0..8 {
+                    let angle = TAU * f64::from(k) / 8.0;
+                    view(less * worth, [angle.sin(), angle.cos(), height]);
+                }
+            }
+        }
+        views
+    }
+
+    /// Bounds of what is to be looked at: all but a ground or a sky that is far larger than what is there.
+    fn subject(&self) -> Option<(DVec3, DVec3)> {
+        let mut all: Vec<(DVec3, DVec3)> = self.surfaces.iter().map(|s| shape_bounds(&s.shape)).collect();
+        let size = |(low, high): &(DVec3, DVec3)| (*high - *low).length();
+        all.sort_by(|a, b| size(a).total_cmp(&size(b)));
+        let mut bounds = *all.first()?;
+        for next in &all[1..] {
+            if size(next) > GROUND * size(&bounds) && size(&bounds) > 0.0 {
+                break;
+            }
+            bounds = (bounds.0.min(next.0), bounds.1.max(next.1));
+        }
+        Some(bounds)
     }
 
     /// A closed walk of so many cameras, evenly spaced in distance walked and angle turned, all with the picture size of
@@ -138,22 +188,12 @@ impl Scene {
         path.even(frames).into_iter().map(|t| path.at(t)).collect()
     }
 
-    /// Whether what a ray from the middle hit speaks for a room around it: the front of a surface, or the back of a
-    /// two-sided one where there is light. Otherwise it is the inside of a solid.
-    fn is_wall(&self, hit: Option<Hit>) -> bool {
-        let lit = || !self.lights.is_empty() || self.materials.iter().any(|m| m.exitance != Rgb::ZERO);
-        hit.is_some_and(|h| {
-            let two_sided = self.materials.get(h.surface.material as usize).is_some_and(|m| m.two_sided);
-            h.front || two_sided && lit()
-        })
-    }
-
     /// Cameras on an ellipse about the default camera.
     fn stroll(&self) -> Vec<Camera> {
         let camera = self.default_camera();
         let (right, above, forward) = camera.frame();
         let (eye, target) = (DVec3::from(camera.eye), DVec3::from(camera.target));
-        let occluders = self.occluders();
+        let sight = Sight::of(self);
         let distance = (target - eye).length();
         let mut radius = STROLL * distance;
         let ring = |radius: f64| {
@@ -165,7 +205,7 @@ impl Scene {
             })
         };
         // As wide as there is room for, with a margin of a quarter.
-        let free = |offset: DVec3| occluders.distance(eye, unit(offset)) > 1.25 * offset.length();
+        let free = |offset: DVec3| sight.distance(eye, unit(offset)) > 1.25 * offset.length();
         for _ in 0..12 {
             if ring(radius).all(|offset| offset == DVec3::ZERO || free(offset)) {
                 break;
@@ -173,20 +213,6 @@ impl Scene {
             radius *= 0.7;
         }
         ring(radius).map(|offset| Camera { eye: (eye + offset).to_array(), ..camera }).collect()
-    }
-
-    /// The largest surfaces, for rays that ask for walls.
-    fn occluders(&self) -> Occluders<'_> {
-        let mut surfaces: Vec<&Surface> = self.surfaces.iter().collect();
-        if surfaces.len() > MAX_OCCLUDERS {
-            let size = |s: &Surface| {
-                let (low, high) = shape_bounds(&s.shape);
-                (high - low).length()
-            };
-            surfaces.sort_by(|a, b| size(b).total_cmp(&size(a)));
-            surfaces.truncate(MAX_OCCLUDERS);
-        }
-        Occluders(surfaces)
     }
 }
 
@@ -335,77 +361,12 @@ fn shape_bounds(shape: &Shape) -> (DVec3, DVec3) {
     }
 }
 
-/// Surfaces that stop rays.
-struct Occluders<'a>(Vec<&'a Surface>);
-
-/// What a ray meets first.
-struct Hit<'a> {
-    surface: &'a Surface,
-    distance: f64,
-    /// Whether it meets the front.
-    front: bool,
-}
-
-impl<'a> Occluders<'a> {
-    /// Distance along a unit direction to the nearest surface; infinite where there is none.
-    fn distance(&self, origin: DVec3, direction: DVec3) -> f64 {
-        self.nearest(origin, direction).map_or(f64::INFINITY, |hit| hit.distance)
-    }
-
-    /// The nearest surface along a unit direction. Cones and tori are passed through: nobody builds a wall of them.
-    fn nearest(&self, origin: DVec3, direction: DVec3) -> Option<Hit<'a>> {
-        let mut nearest: Option<Hit<'a>> = None;
-        for &surface in &self.0 {
-            let (distance, front) = match &surface.shape {
-                Shape::Triangle(p) => polygon_hit(p, origin, direction),
-                Shape::Quad(p) => polygon_hit(p, origin, direction),
-                Shape::Sphere { center, radius } => {
-                    let to = *center - origin;
-                    let (middle, gap) = (to.dot(direction), to.length_squared() - radius * radius);
-                    let half = (middle * middle - gap).sqrt();
-                    let outside = gap > 0.0;
-                    (if outside { middle - half } else { middle + half }, outside)
-                }
-                Shape::Ring { center, normal, inner, outer } => {
-                    let t = (*center - origin).dot(*normal) / direction.dot(*normal);
-                    let r = (origin + direction * t - *center).length();
-                    (if (*inner..=*outer).contains(&r) { t } else { f64::INFINITY }, direction.dot(*normal) < 0.0)
-                }
-                Shape::Cone { .. } | Shape::Torus { .. } => continue,
-            };
-            // False for NaN too: no hit.
-            if distance > 0.0 && distance < nearest.as_ref().map_or(f64::INFINITY, |hit| hit.distance) {
-                nearest = Some(Hit { surface, distance, front: front != surface.flip });
-            }
-        }
-        nearest
-    }
-}
-
-/// Distance to a convex polygon (NaN or infinity where the ray passes it), and whether the ray comes from its front.
-fn polygon_hit(corners: &[DVec3], origin: DVec3, direction: DVec3) -> (f64, bool) {
-    let (mut inside, mut outside) = (true, true);
-    let mut last = corners[corners.len() - 1] - origin;
-    for corner in corners {
-        let next = *corner - origin;
-        let side = last.cross(next).dot(direction);
-        inside &= side >= 0.0;
-        outside &= side <= 0.0;
-        last = next;
-    }
-    if !inside && !outside {
-        return (f64::INFINITY, false);
-    }
-    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    let toward = direction.dot(normal);
-    ((corners[0] - origin).dot(normal) / toward, toward < 0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::builtin;
     use crate::builtin::tests::grey;
+    use hr_diffuse::Surface;
 
     fn without_cameras(name: &str) -> Scene {
         let mut scene = builtin::scene(name).expect("a built-in scene");
@@ -437,7 +398,7 @@ mod tests {
             let (low, high) = scene.bounds().expect("surfaces");
             let eye = DVec3::from(camera.eye);
             assert!(eye.cmpgt(low).all() && eye.cmplt(high).all(), "{name}: {eye} is inside {low} {high}");
-            let free = scene.occluders().distance(eye, camera.frame().2);
+            let free = Sight::of(&scene).distance(eye, camera.frame().2);
             assert!(free > 0.1 * (high - low).length(), "{name}: {free} of free sight");
         }
         let mut dome = object(Shape::Sphere { center: DVec3::ZERO, radius: 5.0 });
@@ -451,6 +412,113 @@ mod tests {
         camera.check("object").expect("usable");
         let distance = (DVec3::from(camera.eye) - DVec3::new(5.0, 6.0, 7.0)).length();
         assert!(distance > 4.0 && distance < 40.0, "outside, not too far: {distance}");
+    }
+
+    /// A box of one-sided walls that face inward, without those named by their indices: −x, +x, −y, +y, −z, +z.
+    fn open_box(low: DVec3, high: DVec3, without: &[usize]) -> Vec<Surface> {
+        let corner = |i: usize| {
+            let pick = |axis: usize| if i >> axis & 1 == 1 { high[axis] } else { low[axis] };
+            DVec3::new(pick(0), pick(1), pick(2))
+        };
+        let walls = [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]];
+        let wall = |w: [usize; 4]| Surface::new(Shape::Quad(w.map(corner)), 0);
+        walls.into_iter().enumerate().filter(|(k, _)| !without.contains(k)).map(|(_, w)| wall(w)).collect()
+    }
+
+    /// A lamp that shines down, of side 2 `half`.
+    fn lamp(center: DVec3, half: f64) -> Surface {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        Surface::new(Shape::Quad(corners.map(|(x, z)| center + DVec3::new(x, 0.0, z) * half)), 1)
+    }
+
+    fn lit(surfaces: Vec<Surface>) -> Scene {
+        let materials = vec![grey("wall", false, 0.0), grey("lamp", false, 10.0)];
+        Scene { name: "made.mgf".into(), surfaces, materials, ..Scene::default() }
+    }
+
+    #[test]
+    fn default_cameras_show_what_is_lit() {
+        let at = DVec3::new;
+        let unit_box = |without: &[usize]| {
+            let mut surfaces = open_box(DVec3::ZERO, at(4.0, 3.0, 5.0), without);
+            surfaces.push(lamp(at(2.0, 2.9, 2.5), 0.5));
+            surfaces
+        };
+        let tube = |length: f64| {
+            let ends = [DVec3::ZERO, at(length, 0.0, 0.0)];
+            let mantle = Surface { flip: true, ..Surface::new(Shape::Cone { ends, radii: [1.0; 2] }, 0) };
+            vec![mantle, lamp(at(0.5 * length, 0.9, 0.0), 0.2)]
+        };
+        let heap = |extra: Vec<Surface>| {
+            let balls = (0..3).map(|k| {
+                let center = at(f64::from(k), 0.4, f64::from(k % 2));
+                Surface::new(Shape::Sphere { center, radius: 0.4 }, 0)
+            });
+            balls.chain([lamp(at(1.0, 4.0, 0.5), 1.0)]).chain(extra).collect::<Vec<_>>()
+        };
+        let ground = |half: f64| {
+            let corner = |x: f64, z: f64| at(x, 0.0, z) * half;
+            let [a, b, c, d] = [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
+            [[a, b, c], [a, c, d]].map(|t| Surface::new(Shape::Triangle(t), 0)).to_vec()
+        };
+        let rooms = || {
+            let far = |s: Surface| Surface {
+                shape: match s.shape {
+                    Shape::Quad(corners) => Shape::Quad(corners.map(|c| c + at(9.0, 0.0, 1.0))),
+                    other => other,
+                },
+                ..s
+            };
+            let second = unit_box(&[]);
+            unit_box(&[]).into_iter().chain(second.into_iter().map(far)).collect::<Vec<_>>()
+        };
+        let tiny = |surfaces: Vec<Surface>| {
+            let small = |c: DVec3| at(100.0, 7.0, -3.0) + c * 1e-4;
+            let shape = |s: Shape| match s {
+                Shape::Quad(corners) => Shape::Quad(corners.map(small)),
+                other => other,
+            };
+            surfaces.into_iter().map(|s| Surface { shape: shape(s.shape.clone()), ..s }).collect::<Vec<_>>()
+        };
+        // Least share of the picture that is to show something lit, near ones and lamps counting less.
+        let cases = [
+            ("a room", unit_box(&[]), 0.4),
+            ("a room without front", unit_box(&[5]), 0.3),
+            ("a room without back", unit_box(&[4]), 0.3),
+            ("a room without a side", unit_box(&[0]), 0.3),
+            ("a room without ceiling", unit_box(&[3]), 0.3),
+            ("a tunnel", tube(12.0), 0.3),
+            ("a ring", tube(1.0), 0.1),
+            ("a long tunnel", tube(300.0), 0.02),
+            ("a heap", heap(vec![]), 0.01),
+            ("a heap on a ground", heap(ground(8.0)), 0.3),
+            ("a heap on a huge ground", heap(ground(4000.0)), 0.3),
+            ("rooms apart", rooms(), 0.4),
+            ("a tiny room", tiny(unit_box(&[])), 0.4),
+        ];
+        for (name, surfaces, least) in cases {
+            let scene = lit(surfaces);
+            let camera = scene.default_camera();
+            camera.check(name).expect("usable");
+            let seen = Sight::of(&scene).seen(&camera);
+            assert!(seen >= least, "{name}: {seen} of {camera:?}");
+        }
+        let along = lit(tube(300.0)).default_camera().frame().2.x.abs();
+        assert!(along > 0.6, "along the tunnel rather than at its wall: {along}");
+        // The balls of the heap are not lost on the ground: they are 2 m wide.
+        let eye = DVec3::from(lit(heap(ground(4000.0))).default_camera().eye);
+        assert!(eye.length() < 30.0, "near the balls: {eye}");
+    }
+
+    #[test]
+    fn nobody_stands_inside_of_closed_things_that_light_does_not_enter() {
+        // Two-sided walls, and the lamp outside.
+        let mut surfaces = open_box(DVec3::ZERO, DVec3::ONE, &[]);
+        surfaces.push(lamp(DVec3::new(0.5, 4.0, 0.5), 1.0));
+        let mut scene = lit(surfaces);
+        scene.materials[0].two_sided = true;
+        let eye = DVec3::from(scene.default_camera().eye);
+        assert!(eye.cmplt(DVec3::ZERO).any() || eye.cmpgt(DVec3::ONE).any(), "outside: {eye}");
     }
 
     #[test]
@@ -490,9 +558,9 @@ mod tests {
     #[test]
     fn the_walk_through_the_room_touches_nothing() {
         let scene = builtin::scene("room").expect("there");
-        let occluders = scene.occluders();
+        let sight = Sight::of(&scene);
         for (k, camera) in scene.walkthrough(60).iter().enumerate() {
-            let free = sphere_directions(200).map(|d| occluders.distance(camera.eye.into(), d)).fold(9.0, f64::min);
+            let free = sphere_directions(200).map(|d| sight.distance(camera.eye.into(), d)).fold(9.0, f64::min);
             assert!(free > 0.3, "frame {k}: {free} m to the nearest surface");
         }
     }

@@ -2,17 +2,23 @@
 
 use crate::SceneError;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The contents of a regular file; others might never end.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("not a regular file"));
-    }
+    is_regular(&fs::metadata(path)?)?;
     fs::read(path)
+}
+
+fn is_regular(found: &fs::Metadata) -> io::Result<()> {
+    match found {
+        found if found.is_file() => Ok(()),
+        found if found.is_dir() => Err(io::Error::other("this is a folder; give a file")),
+        _ => Err(io::Error::other("not a regular file")),
+    }
 }
 
 /// As [`read`], with an error that names the file.
@@ -20,45 +26,18 @@ pub(crate) fn read_whole(path: &Path) -> Result<Vec<u8>, SceneError> {
     read(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })
 }
 
-/// Files of more bytes are read by several threads, at least so much by each.
-const PART: usize = 1 << 22;
-
-/// The contents of a regular file as 8-byte words in the machine's byte order, ready to be cast to arrays, zeros after the
-/// last byte; and the number of bytes.
+/// A regular file, opened to be read, and its length in bytes.
 ///
 /// # Errors
-/// [`SceneError::Io`] with `path` where it cannot be read, or is no regular file.
-pub fn read_words(path: &Path) -> Result<(Vec<u64>, u64), SceneError> {
-    let read = || {
-        let mut file = File::open(path)?;
+/// [`SceneError::Io`] with `path` where it cannot be opened, or is no regular file.
+pub fn open(path: &Path) -> Result<(File, u64), SceneError> {
+    let open = || {
+        let file = File::open(path)?;
         let found = file.metadata()?;
-        if !found.is_file() {
-            return Err(io::Error::other("not a regular file"));
-        }
-        let length = usize::try_from(found.len()).map_err(io::Error::other)?;
-        let mut words = vec![0_u64; length.div_ceil(size_of::<u64>())];
-        let bytes = &mut bytemuck::cast_slice_mut(&mut words)[..length];
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let part = length.div_ceil(threads).max(PART);
-        if length <= part {
-            file.read_exact(bytes)?;
-        } else {
-            // Most of the time goes into memory that is touched for the first time, each part of it by one thread.
-            std::thread::scope(|scope| {
-                let read = |(i, bytes): (usize, &mut [u8])| {
-                    let mut file = File::open(path)?;
-                    file.seek(SeekFrom::Start((i * part) as u64))?;
-                    file.read_exact(bytes)
-                };
-                let parts: Vec<_> =
-                    bytes.chunks_mut(part).enumerate().map(|part| scope.spawn(move || read(part))).collect();
-                let failed = || io::Error::other("a thread that read it failed");
-                parts.into_iter().try_for_each(|part| part.join().unwrap_or_else(|_| Err(failed())))
-            })?;
-        }
-        Ok((words, found.len()))
+        is_regular(&found)?;
+        Ok((file, found.len()))
     };
-    read().map_err(|source| SceneError::Io { path: path.to_owned(), source })
+    open().map_err(|source| SceneError::Io { path: path.to_owned(), source })
 }
 
 /// Temporary files that are neither renamed nor removed yet.
@@ -198,7 +177,7 @@ mod tests {
         write_whole(&path, |out| out.write_all(b"all")).expect("written");
         assert_eq!(read_whole(&path).expect("there"), b"all", "its contents");
         let error = read_whole(&folder.path("")).expect_err("a folder").to_string();
-        assert!(error.ends_with("not a regular file"), "'{error}'");
+        assert!(error.ends_with("this is a folder; give a file"), "'{error}'");
         if cfg!(unix) {
             let error = read(Path::new("/dev/zero")).expect_err("it has no end").to_string();
             assert_eq!(error, "not a regular file", "refused at once");

@@ -7,7 +7,7 @@ use crate::export;
 use crate::glossy::Mode;
 use crate::html;
 use crate::interrupt::{Interrupt, STOPPING};
-use crate::loading::load;
+use crate::loading::{is_dark, load};
 use crate::progress::Progress;
 use crate::raycast::RayCaster;
 use crate::session;
@@ -17,6 +17,7 @@ use crate::stats::{self, Times};
 use crate::window::WindowError;
 use hr_diffuse::{Budget, Phase, Settings};
 use hr_scene::{Camera, Exposure, ImageKind, Rgb, Scene, SceneError, ToneMap};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -79,16 +80,25 @@ impl Output {
     }
 }
 
-/// Whether the folder that a file is to be written to is there.
+/// Whether a file can be written there: its folder is one, and it is none itself.
 fn has_folder(path: &Path) -> Result<(), SceneError> {
+    let fault = |text: String| SceneError::Io { path: path.to_path_buf(), source: std::io::Error::other(text) };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let is_folder = std::fs::metadata(folder)
-        .map_or_else(Err, |found| if found.is_dir() { Ok(()) } else { Err(std::io::ErrorKind::NotADirectory.into()) });
-    is_folder.map_err(|source| SceneError::Io { path: path.to_path_buf(), source })
+    match std::fs::metadata(folder) {
+        Ok(found) if !found.is_dir() => Err(fault(format!("{} is a file; name a folder", folder.display()))),
+        Ok(_) if path.is_dir() => Err(fault("this is a folder; give a file name".into())),
+        Ok(_) => Ok(()),
+        Err(error) => Err(fault(format!("the folder {}: {error}; make it first, or name another", folder.display()))),
+    }
 }
 
 fn make_folder(folder: &Path) -> Result<(), SceneError> {
-    std::fs::create_dir_all(folder).map_err(|source| SceneError::Io { path: folder.to_path_buf(), source })
+    let fault = |source: std::io::Error| match source.kind() {
+        ErrorKind::AlreadyExists => std::io::Error::other("this is a file; give a folder"),
+        _ => source,
+    };
+    std::fs::create_dir_all(folder)
+        .map_err(|source| SceneError::Io { path: folder.to_path_buf(), source: fault(source) })
 }
 
 /// What there is to show, and how.
@@ -190,6 +200,7 @@ impl Show<'_> {
         let scene = &self.solved.scene;
         let watch = |share| self.progress.at("taking the picture", share);
         let image = self.caster().render(&scene.default_camera(), &watch);
+        self.warn_if_black(&image.pixels);
         image.save(path, &ToneMap::default(), scene.primaries)?;
         self.write_stats()
     }
@@ -221,6 +232,7 @@ impl Show<'_> {
             .into_iter()
             .flat_map(|camera| meter.render(&resized(camera, METER_SIZE), &|_| ()).pixels)
             .collect();
+        self.warn_if_black(&metered);
         let exposure = Exposure::Factor(ToneMap::default().factor(&metered, scene.primaries));
         let tone_map = ToneMap { exposure, ..ToneMap::default() };
         for (number, camera) in walk(FRAMES).into_iter().enumerate() {
@@ -232,6 +244,16 @@ impl Show<'_> {
         }
         self.progress.say(&format!("{FRAMES} frames written to {}", folder.display()));
         self.write_stats()
+    }
+
+    /// Where nothing shines at all, that has been said.
+    fn warn_if_black(&self, pixels: &[Rgb]) {
+        if pixels.iter().all(|pixel| *pixel == Rgb::ZERO) && !is_dark(&self.solved.scene) {
+            self.progress.say(
+                "warning: all is black: nothing that is lit is in view; give --camera a view of it, and see whether lamps are \
+                 enclosed or surfaces face away",
+            );
+        }
     }
 
     fn caster(&self) -> RayCaster<'_> {

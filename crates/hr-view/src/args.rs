@@ -117,6 +117,9 @@ impl Args {
 
 /// clap's message without its headings, usage and blank lines.
 fn one_line(error: &clap::Error) -> String {
+    if error.kind() == ErrorKind::InvalidUtf8 {
+        return "a name on the command line is not text in UTF-8; rename the file".to_owned();
+    }
     let text = error.to_string();
     let text = text.strip_prefix("error: ").unwrap_or(&text);
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());

@@ -37,7 +37,7 @@ pub(crate) fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewE
 }
 
 /// Whether no surface and no light emits anything.
-fn is_dark(scene: &Scene) -> bool {
+pub(crate) fn is_dark(scene: &Scene) -> bool {
     let shines = |material: u32| scene.materials[material as usize].exitance != Rgb::ZERO;
     scene.lights.iter().all(|light| light.intensity == Rgb::ZERO) && !scene.surfaces.iter().any(|s| shines(s.material))
 }

@@ -11,11 +11,13 @@ use glossy_ext::haar::Refinement;
 use hr_diffuse::Solution;
 use hr_diffuse::flat::{Reader, Writer};
 use hr_diffuse::keep::RestoreError;
-use hr_scene::whole_file::{read_words, write_whole};
+use hr_scene::whole_file::{open, write_whole};
 use hr_scene::{Scene, SceneError};
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use xxhash_rust::xxh3::Xxh3;
 
 /// What the file begins with. Written in the machine's byte order: on a big-endian machine files of others are unknown.
@@ -93,7 +95,9 @@ struct Head {
     checksum: u64,
 }
 
-const HEAD_WORDS: usize = size_of::<Head>() / size_of::<u64>();
+/// Files are read in pieces of so many bytes, which the processor's caches hold, and so many of them ahead.
+const PIECE: usize = 1 << 17;
+const AHEAD: usize = 4;
 
 impl Head {
     /// The checksum, that of what follows the head being known.
@@ -148,26 +152,39 @@ pub fn save(path: &Path, solved: &Solved, accuracy: Accuracy) -> Result<(), Scen
 /// [`SolutionError`]: anything but what [`save`] wrote for this very scene.
 pub fn load(path: &Path, scene: Arc<Scene>) -> Result<(Solved, Accuracy), SolutionError> {
     let at = || path.to_path_buf();
-    let (words, found) = read_words(path)?;
-    let (head, body) = match words.split_at_checked(HEAD_WORDS) {
-        Some((head, body)) if head[0] == MAGIC => (bytemuck::cast_slice::<u64, Head>(head)[0], body),
-        _ => return Err(SolutionError::Foreign { path: at() }),
+    let broken = |source| SolutionError::File(SceneError::Io { path: at(), source });
+    let (mut file, found) = open(path)?;
+    let mut head = [0; size_of::<Head>()];
+    let head: Head = match file.read_exact(&mut head) {
+        Ok(()) => bytemuck::pod_read_unaligned(&head),
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+            return Err(SolutionError::Foreign { path: at() });
+        }
+        Err(error) => return Err(broken(error)),
     };
+    if head.magic != MAGIC {
+        return Err(SolutionError::Foreign { path: at() });
+    }
     if head.version != VERSION {
         return Err(SolutionError::Version { path: at(), found: head.version });
     }
     if head.length != found {
         return Err(SolutionError::Length { path: at(), found, expected: head.length });
     }
-    // What is damaged can be read as safely as what is forged.
-    let is_whole = || {
-        let mut sum = Xxh3::new();
-        sum.update(bytemuck::cast_slice(body));
-        head.sealed(sum).checksum == head.checksum
-    };
-    let checks = || rayon::join(is_whole, || head.scene == scene.fingerprint());
-    let (restored, (is_whole, is_its_own)) = rayon::join(|| restore(&scene, &mut Reader::new(body)), checks);
-    if !is_whole {
+    let (pieces, ahead) = sync_channel(AHEAD);
+    let (used, again) = channel();
+    // What is damaged can be read as safely as what is forged: while one thread reads and sums, another restores.
+    let (restored, sum, is_its_own) = std::thread::scope(|scope| {
+        let reading = scope.spawn(move || read_ahead(file, &pieces, &again));
+        let owned = scope.spawn(|| head.scene == scene.fingerprint());
+        let mut body = Ahead { pieces: ahead, used, piece: Vec::new(), at: 0 };
+        let restored = restore(&scene, &mut Reader::new(&mut body, found - size_of::<Head>() as u64));
+        drop(body);
+        let failed = || io::Error::other("a thread that read it failed");
+        let sum = reading.join().unwrap_or_else(|_| Err(failed()));
+        (restored, sum, owned.join().unwrap_or(false))
+    });
+    if head.sealed(sum.map_err(broken)?).checksum != head.checksum {
         return Err(SolutionError::Checksum { path: at() });
     }
     if !is_its_own {
@@ -175,6 +192,47 @@ pub fn load(path: &Path, scene: Arc<Scene>) -> Result<(Solved, Accuracy), Soluti
     }
     let (solution, accuracy) = restored.map_err(|source| SolutionError::Content { path: at(), source })?;
     Ok((Solved { scene, solution }, accuracy))
+}
+
+/// Hands on a file in pieces, as long as somebody takes them, and sums all of it.
+fn read_ahead(mut file: File, pieces: &SyncSender<Vec<u8>>, again: &Receiver<Vec<u8>>) -> io::Result<Xxh3> {
+    let mut sum = Xxh3::new();
+    loop {
+        let mut piece = again.try_recv().unwrap_or_default();
+        piece.resize(PIECE, 0);
+        let length = match file.read(&mut piece) {
+            Ok(0) => return Ok(sum),
+            Ok(length) => length,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            Err(error) => return Err(error),
+        };
+        piece.truncate(length);
+        sum.update(&piece);
+        // Where nobody wants more of it, the sum is still to be known.
+        drop(pieces.send(piece));
+    }
+}
+
+/// Reads what another thread has read.
+struct Ahead {
+    pieces: Receiver<Vec<u8>>,
+    used: Sender<Vec<u8>>,
+    piece: Vec<u8>,
+    at: usize,
+}
+
+impl Read for Ahead {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.at == self.piece.len() {
+            // None come any more: this is the end.
+            let Ok(next) = self.pieces.recv() else { return Ok(0) };
+            drop(self.used.send(std::mem::replace(&mut self.piece, next)));
+            self.at = 0;
+        }
+        let length = (&self.piece[self.at..]).read(out)?;
+        self.at += length;
+        Ok(length)
+    }
 }
 
 fn restore(scene: &Arc<Scene>, from: &mut Reader<'_>) -> Result<(Solution<GlossyField>, Accuracy), RestoreError> {

@@ -44,6 +44,72 @@ fn mistakes_are_status_1_and_one_line() {
     }
 }
 
+/// What is in the way is told before anything is solved.
+#[test]
+fn folders_and_files_are_not_mixed_up() {
+    let folder = Folder::new("mixed");
+    let file = folder.write("file.obj", "");
+    for name in ["folder.obj", "folder.png", "folder.html"] {
+        std::fs::create_dir_all(folder.path(name)).expect("the folder is ours");
+    }
+    let [obj, png, html] = ["folder.obj", "folder.png", "folder.html"].map(|name| folder.path(name));
+    let inside = format!("{file}/a.png");
+    let cases: [(&[&str], &str); 8] = [
+        (&[&obj, "--image", "a.png"], "give a file"),
+        (&["furnace", "--load", &obj, "--image", "a.png"], "give a file"),
+        (&["furnace", "--image", &png], "give a file name"),
+        (&["furnace", "--html", &html], "give a file name"),
+        (&["furnace", "--save", &obj, "--image", "a.png"], "give a file name"),
+        (&["furnace", "--frames", &file], "give a folder"),
+        (&["furnace", "--image", &inside], "name a folder"),
+        (&["furnace", "--image", "no/such/folder/a.png"], "make it first"),
+    ];
+    for (arguments, hint) in cases {
+        let output = hr_view(arguments);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
+        assert!(text.lines().count() == 1 && text.contains(hint), "{arguments:?} says: {text}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn names_that_are_no_text_are_refused() {
+    use std::os::unix::ffi::OsStrExt;
+    let name = std::ffi::OsStr::from_bytes(b"n\xff.obj");
+    let output = command(&[]).arg(name).output().expect("the command runs");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.lines().count() == 1 && text.contains("rename the file"), "says: {text}");
+}
+
+#[test]
+fn scenes_of_which_nothing_is_left_say_why() {
+    let folder = Folder::new("nothing");
+    for (face, hint) in [("v nan 0 0\nv 1 0 0\nv 0 1 0\n", "not finite"), ("v 0 0 0\nv 1 0 0\nv 2 0 0\n", "no area")] {
+        let scene = folder.write("scene.obj", &format!("{face}f 1 2 3\n"));
+        let output = hr_view(&[&scene, "--image", &folder.path("a.png")]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        assert!(text.lines().count() == 1 && text.contains(hint) && text.contains(":4"), "{face} says: {text}");
+    }
+}
+
+#[test]
+fn black_pictures_are_not_silent() {
+    let folder = Folder::new("black");
+    let away = folder
+        .write("away.json", r#"{"eye":[50,50,50],"target":[90,90,90],"up":[0,0,1],"fov_x":80,"width":24,"height":16}"#);
+    let image = folder.path("a.png");
+    let inside = folder.write("inside.json", IN_THE_FURNACE);
+    for (camera, black) in [(away, true), (inside, false)] {
+        let output = hr_view(&["furnace", "--error", "0.5", "--camera", &camera, "--image", &image]);
+        assert_eq!(output.status.code(), Some(0), "black pictures are no mistake");
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(text.contains("all is black"), black, "of the view {camera}: {text}");
+    }
+}
+
 #[test]
 fn help_goes_to_standard_output() {
     let output = hr_view(&["--help"]);

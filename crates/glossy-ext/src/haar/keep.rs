@@ -43,14 +43,11 @@ impl Haar {
     /// # Errors
     /// Where it is anything else.
     pub fn restore(from: &mut Reader<'_>) -> Result<Vec<Self>, FlatError> {
-        let heads: &[Head] = from.view(WHAT)?;
-        let (mut vertices, mut nodes): (&[Half3], &[Node]) = (from.view(WHAT)?, from.view(WHAT)?);
-        let mut parts = Vec::with_capacity(heads.len());
-        for head in heads {
-            parts.push((head, split_off(&mut vertices, head.vertices)?, split_off(&mut nodes, head.nodes)?));
-        }
-        fits(vertices.is_empty() && nodes.is_empty(), WHAT)?;
-        let restored = parts.into_par_iter().with_min_len(64).map(|(head, vertices, nodes)| {
+        let heads: Vec<Head> = from.take(WHAT)?;
+        let vertices: Vec<Vec<Half3>> = from.take_groups(heads.iter().map(|head| head.vertices), WHAT)?;
+        let nodes: Vec<Vec<Node>> = from.take_groups(heads.iter().map(|head| head.nodes), WHAT)?;
+        let parts: Vec<_> = heads.into_iter().zip(vertices).zip(nodes).collect();
+        let restored = parts.into_par_iter().with_min_len(64).map(|((head, vertices), nodes)| {
             let roots = head.roots.try_into().map_err(|_| FlatError::Misfit(WHAT))?;
             let haar = Self { scale: head.scale, roots, vertices: vertices.into(), nodes: nodes.into() };
             fits(haar.is_sound(), WHAT).map(|()| haar)
@@ -87,11 +84,4 @@ impl Haar {
             level <= MAX_LEVEL && are_vertices && (node.is_childless() || node.is_divided() && follow())
         })
     }
-}
-
-/// Takes so many entries off the front.
-fn split_off<'a, T>(rest: &mut &'a [T], count: u32) -> Result<&'a [T], FlatError> {
-    let (taken, after) = rest.split_at_checked(count as usize).ok_or(FlatError::Misfit(WHAT))?;
-    *rest = after;
-    Ok(taken)
 }

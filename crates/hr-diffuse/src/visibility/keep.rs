@@ -18,10 +18,7 @@ impl Visibility {
 
     /// Reads it again, for surfaces of which rays meet those that are their own `first`.
     pub(crate) fn restore(geometries: Vec<Geometry>, first: &[u32], from: &mut Reader<'_>) -> Result<Self, FlatError> {
-        // Nodes are aligned to more than arrays are.
-        let words: &[[u32; size_of::<Node>() / size_of::<u32>()]] = from.view(TREE)?;
-        let mut nodes = vec![Node::EMPTY; words.len()];
-        bytemuck::cast_slice_mut(&mut nodes).copy_from_slice(words);
+        let nodes: Vec<Node> = from.take(TREE)?;
         let (leaves, surfaces): (Vec<Leaf>, Vec<u32>) = (from.take(TREE)?, from.take(TREE)?);
         fits(is_tree(&nodes, leaves.len()), TREE)?;
         let is_within =

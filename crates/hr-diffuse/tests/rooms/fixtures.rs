@@ -1,7 +1,7 @@
 //! What the rooms are made of.
 
 use glam::DVec3;
-use hr_diffuse::flat::Writer;
+use hr_diffuse::flat::{Reader, Writer};
 use hr_diffuse::{
     DiffuseMaterial, Light, LightKind, Progress, Rgb, SceneInput, Settings, Shape, Solution, Solver, Surface,
 };
@@ -76,10 +76,14 @@ pub(crate) fn apart(a: &[Rgb], b: &[Rgb]) -> f32 {
 }
 
 /// A solution as it is kept.
-pub(crate) fn stored(solution: &Solution) -> Vec<u64> {
+pub(crate) fn stored(solution: &Solution) -> Vec<u8> {
     let mut bytes = Vec::new();
     solution.store(&mut Writer::new(&mut bytes)).expect("memory takes everything");
-    let (words, rest) = bytes.as_chunks::<8>();
-    assert!(rest.is_empty(), "arrays end at words");
-    words.iter().map(|word| u64::from_ne_bytes(*word)).collect()
+    bytes
+}
+
+/// A solution that was kept.
+pub(crate) fn restored(input: &SceneInput, bytes: &[u8]) -> Solution {
+    let mut from = bytes;
+    Solution::restore(input, (), &mut Reader::new(&mut from, bytes.len() as u64)).expect("what was written")
 }

@@ -1,9 +1,8 @@
 //! Things that move have the light of a fresh solve, and links that this does not concern stay.
 
-use crate::fixtures::{bulb, ceiling_lamp, lamp, on, paint, quad, stored, table, walls};
+use crate::fixtures::{bulb, ceiling_lamp, lamp, on, paint, quad, restored, stored, table, walls};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
-use hr_diffuse::flat::Reader;
-use hr_diffuse::{LightKind, Rgb, SceneInput, Settings, Shape, Solution, SolveError, Solver, Surface};
+use hr_diffuse::{LightKind, Rgb, SceneInput, Settings, Shape, SolveError, Solver, Surface};
 use std::f64::consts::FRAC_PI_3;
 use std::ops::{ControlFlow, Range};
 
@@ -212,14 +211,14 @@ fn what_was_moved_can_be_kept() {
     place(&mut input, CUP, DAffine3::from_translation(DVec3::X * 3.5));
     solver.rearrange(&input, &mut on).expect("a box beside the room");
     let solution = solver.finish(&mut on);
-    let words = stored(&solution);
-    let read = Solution::restore(&input, (), &mut Reader::new(&words)).expect("what was written");
+    let bytes = stored(&solution);
+    let read = restored(&input, &bytes);
     assert_eq!(read.scene.surfaces(), solution.scene.surfaces(), "surfaces in unit space");
     for (at, way) in [(Vec3::splat(0.3), Vec3::X), (Vec3::new(0.6, 0.2, 0.5), Vec3::new(0.1, 0.3, -1.0))] {
         let [kept, made] = [&read, &solution].map(|it| it.scene.visibility.closest(at, way, 0.0, f32::MAX));
         assert!(made.is_some() && kept == made, "{kept:?} and {made:?} are met");
     }
-    assert!(stored(&read) == words, "nothing was lost on the way");
+    assert!(stored(&read) == bytes, "nothing was lost on the way");
 }
 
 #[test]

@@ -1,8 +1,7 @@
 //! A solve that goes on after a stop ends at the answer of one that was not stopped.
 
-use crate::fixtures::{lamp, on, paint, quad, stored, table, walls};
+use crate::fixtures::{lamp, on, paint, quad, restored, stored, table, walls};
 use glam::DVec3;
-use hr_diffuse::flat::Reader;
 use hr_diffuse::{Budget, Rgb, SceneInput, Settings, Shape, Solution, SolveError, Solver, Surface};
 use std::ops::ControlFlow;
 
@@ -98,8 +97,8 @@ fn spent_budgets_are_no_end() {
 #[test]
 fn what_is_kept_goes_on_as_if_it_had_never_been_away() {
     let stopped = || finished(new(ERROR), 40);
-    let words = stored(&stopped());
-    let read = Solution::restore(&room(), (), &mut Reader::new(&words)).expect("what was written");
+    let kept = stored(&stopped());
+    let read = restored(&room(), &kept);
     let (there, here) = (go_on(read, ERROR), go_on(stopped(), ERROR));
     assert_eq!(there.links.all(), here.links.all(), "links");
     assert_eq!(there.exitant.irradiance, here.exitant.irradiance, "light");

@@ -50,7 +50,7 @@ impl Frame<'_> {
             numerator: [n[0], n[1], tone.exposure, BRIGHTEST],
             denominator: [d[0], d[1], d[2], if format.is_srgb() { 0.0 } else { 1.0 }],
             luminance: column(self.mesh.primaries.luminance_weights().as_vec3(), self.gauge.quantity.number()),
-            scale: [self.gauge.high.log2() - DECADES * LOG2_10, (DECADES * LOG2_10).recip(), 0.0, 0.0],
+            scale: [self.gauge.high.log2() - DECADES * LOG2_10, (DECADES * LOG2_10).recip(), tone.curve.white(), 0.0],
             ramp: RAMP.map(|[r, g, b]| [r, g, b, 0.0]),
         }
     }

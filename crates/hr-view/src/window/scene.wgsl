@@ -15,7 +15,7 @@ struct Frame {
     numerator: vec4f,   // a, b of the curve; exposure; largest exposed value
     denominator: vec4f, // c, d, e of the curve; 1 where the target does not encode sRGB by itself
     luminance: vec4f,   // weights; w: the quantity in false colours: 0 none, 1 radiance, 2 radiosity, 3 irradiance
-    scale: vec4f,       // binary logarithm of the low end, 1 / that of high / low
+    scale: vec4f,       // binary logarithm of the low end, 1 / that of high / low; where the curve is white
     ramp: array<vec4f, RAMP>,
 }
 
@@ -107,10 +107,19 @@ fn glossy_textured(v: Vertex, @location(5) glossy: vec3f) -> Textured {
     return textured(v, glossy);
 }
 
-fn curve(x: vec3f) -> vec3f {
+fn curve(x: vec2f) -> vec2f {
     let n = frame.numerator;
     let d = frame.denominator;
-    return clamp((x * (n.x * x + n.y)) / (x * (d.x * x + d.y) + d.z), vec3f(0.0), vec3f(1.0));
+    return clamp((x * (n.x * x + n.y)) / (x * (d.x * x + d.y) + d.z), vec2f(0.0), vec2f(1.0));
+}
+
+// The curve of a colour, whose hue stays: as in tone.rs.
+fn printed(exposed: vec3f) -> vec3f {
+    let color = exposed * min(frame.scale.z / max(max(exposed.x, max(exposed.y, exposed.z)), 1e-30), 1.0);
+    let low = min(color.x, min(color.y, color.z));
+    let high = max(color.x, max(color.y, color.z));
+    let ends = curve(vec2f(low, high));
+    return vec3f(ends.x) + (color - low) * ((ends.y - ends.x) / max(high - low, 1e-30));
 }
 
 // 1.055 x^(1/2.4) − 0.055 above its linear part, to a tenth of a code of 255: two square roots, as a power costs several
@@ -147,7 +156,7 @@ fn developed(value: vec3f) -> vec4f {
     if FALSE_COLORS {
         return encoded(graded(value));
     }
-    return encoded(curve(max(value, vec3f(0.0))));
+    return encoded(printed(max(value, vec3f(0.0))));
 }
 
 fn shown(value: vec3f) -> vec4f {

@@ -1,11 +1,12 @@
 //! From radiance to screen: exposure, primaries, a filmic curve, the sRGB encoding.
 //!
 //! The same formula runs in the shader, with every constant of it in the uniforms; [`Tone::apply`] is what the shader
-//! is tested against.
+//! is tested against. It is that of saved pictures ([`hr_scene::tonemap`]), which says why it is so.
 
 use crate::display::DisplayMesh;
 use glam::{Mat3, Vec3};
 use glossy_ext::Rgb;
+use hr_scene::tonemap::Meter;
 
 /// A filmic curve y = x (a x + b) / (x (c x + d) + e), the common form of the usual rational fits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +27,17 @@ impl Curve {
         let ([a, b], [c, d, e]) = (self.numerator, self.denominator);
         ((x * (a * x + b)) / (x * (c * x + d) + e)).clamp(0.0, 1.0)
     }
+
+    /// Where the curve reaches 1; [`BRIGHTEST`] if it does so farther on or never.
+    #[must_use]
+    pub fn white(&self) -> f32 {
+        let ([a, b], [c, d, e]) = (self.numerator.map(f64::from), self.denominator.map(f64::from));
+        // The larger root of (a − c) x² + (b − d) x = e.
+        let (p, q) = (a - c, b - d);
+        let root = if p == 0.0 { e / q } else { (-q + (q * q + 4.0 * p * e).sqrt()) / (2.0 * p) };
+        let white = root as f32;
+        if white > 0.0 { white.min(BRIGHTEST) } else { BRIGHTEST }
+    }
 }
 
 /// Everything between radiance and screen.
@@ -35,28 +47,30 @@ pub struct Tone {
     pub exposure: f32,
     /// From the scene's primaries to linear sRGB.
     pub to_srgb: Mat3,
-    /// The curve, per channel.
+    /// The curve, of the largest and the smallest channel.
     pub curve: Curve,
 }
 
 /// Exposed values are cut here: far beyond white, and the curve's squares stay finite.
 pub(crate) const BRIGHTEST: f32 = 1e6;
 
-/// Exposed luminance of a scene's mean, as that of pictures in [`hr_scene::tonemap`]: the key of a normally lit scene in
-/// E. Reinhard et al., "Photographic Tone Reproduction for Digital Images", 2002.
-const KEY: f32 = 0.18;
+/// In place of 0 as a divisor.
+const TINY: f32 = 1e-30;
+
+/// Share of the lit area that may be brighter than the curve's shoulder; lamps are not among it.
+const HIGHLIGHTS: f64 = 0.02;
 
 impl Tone {
-    /// For a mesh, exposed so that the geometric mean of its diffuse radiance becomes middle grey (E. Reinhard et al.,
-    /// "Photographic Tone Reproduction for Digital Images", 2002, equations 1 and 2). The mean is taken over area, so
-    /// that it does not depend on how finely surfaces are meshed; where no diffuse surface is lit, over emission.
+    /// For a mesh, exposed so that the geometric mean of its diffuse radiance becomes middle grey, or darker where more
+    /// than a fiftieth of it would burn out ([`Meter`]). Area counts, so that it does not depend on how finely surfaces
+    /// are meshed; where no diffuse surface is lit, emission does.
     #[must_use]
     pub fn for_mesh(mesh: &DisplayMesh) -> Self {
         let to_srgb = mesh.primaries.to_srgb().as_mat3();
         let diffuse = |v: usize| mesh.irradiance[v] * mesh.tint[v];
         let emitted = |v: usize| mesh.emission[v];
-        let mean = log_mean(mesh, diffuse).or_else(|| log_mean(mesh, emitted));
-        let exposure = mean.map_or(1.0, |mean| (KEY / mean).clamp(1e-20, 1e20));
+        let factor = metered(mesh, diffuse).or_else(|| metered(mesh, emitted));
+        let exposure = factor.map_or(1.0, |factor| factor.clamp(1e-20, 1e20) as f32);
         Self { exposure, to_srgb, curve: Curve::ACES_FIT }
     }
 
@@ -65,8 +79,12 @@ impl Tone {
     pub fn apply(&self, radiance: Rgb) -> Vec3 {
         // Cut on both sides of the matrix: nothing may overflow in it, no negative channel may come out of it.
         let exposed = finite(radiance * self.exposure).clamp(Vec3::ZERO, Vec3::splat(BRIGHTEST));
-        let linear = self.to_srgb * exposed;
-        Vec3::from_array(linear.to_array().map(|x| srgb_encode(self.curve.at(x.max(0.0)))))
+        let linear = (self.to_srgb * exposed).max(Vec3::ZERO);
+        let color = linear * (self.curve.white() / linear.max_element().max(TINY)).min(1.0);
+        let (low, high) = (color.min_element(), color.max_element());
+        let (dark, bright) = (self.curve.at(low), self.curve.at(high));
+        let printed = Vec3::splat(dark) + (color - low) * ((bright - dark) / (high - low).max(TINY));
+        Vec3::from_array(printed.to_array().map(srgb_encode))
     }
 }
 
@@ -80,27 +98,21 @@ pub(crate) fn srgb_encode(x: f32) -> f32 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Geometric mean of the luminance of a radiance over all lit surface area; `None` where there is none.
-fn log_mean(mesh: &DisplayMesh, radiance: impl Fn(usize) -> Rgb) -> Option<f32> {
-    let weights = mesh.primaries.luminance_weights().as_vec3();
-    let (mut sum, mut area) = (0.0_f64, 0.0_f64);
+/// The exposure of a radiance over all lit surface area; `None` where there is none.
+fn metered(mesh: &DisplayMesh, radiance: impl Fn(usize) -> Rgb) -> Option<f64> {
+    let weights = mesh.primaries.luminance_weights();
+    let mut meter = Meter::default();
     for batch in &mesh.batches {
         let indices = &mesh.indices[batch.indices.start as usize..batch.indices.end as usize];
         for corners in indices.chunks_exact(3) {
             let [a, b, c] = [corners[0], corners[1], corners[2]].map(|i| mesh.positions[i as usize]);
             let third = f64::from((b - a).cross(c - a).length()) / 6.0;
             for &corner in corners {
-                let luminance = weights.dot(radiance(corner as usize));
-                if luminance > 0.0 && luminance.is_finite() {
-                    sum += third * f64::from(luminance).ln();
-                    area += third;
-                }
+                meter.add(weights.dot(radiance(corner as usize).as_dvec3()), third);
             }
         }
     }
-    let mean = (sum / area).exp();
-    #[expect(clippy::cast_possible_truncation, reason = "checked to be finite after it")]
-    Some(mean as f32).filter(|m| m.is_finite() && *m > 0.0)
+    meter.factor(HIGHLIGHTS)
 }
 
 #[cfg(test)]
@@ -116,7 +128,15 @@ mod tests {
             let tone = Tone { exposure: 0.7, to_srgb: primaries.to_srgb().as_mat3(), curve: Curve::ACES_FIT };
             let map = hr_scene::ToneMap { exposure: hr_scene::Exposure::Factor(0.7), stops: 0.0 };
             let print = map.print(&[], primaries);
-            for color in [Rgb::splat(0.01), Rgb::new(0.2, 1.0, 3.0), Rgb::X, Rgb::Y, Rgb::Z, Rgb::splat(1e9)] {
+            for color in [
+                Rgb::splat(0.01),
+                Rgb::new(0.2, 1.0, 3.0),
+                Rgb::new(90.0, 1.0, 0.1),
+                Rgb::X,
+                Rgb::Y,
+                Rgb::Z,
+                Rgb::splat(1e9),
+            ] {
                 let (window, picture) = (tone.apply(color) * 255.0, print.srgb8(color));
                 for c in 0..3 {
                     // Half a code of rounding, and f32 here against f64 there.
@@ -136,6 +156,13 @@ mod tests {
             assert!(y >= last && (0.0..=1.0).contains(&y), "not monotone at step {step}: {last} to {y}");
             last = y;
         }
+        assert!((f64::from(tone.curve.white()) - hr_scene::tonemap::WHITE).abs() < 1e-3, "white as in pictures");
+        for (curve, white) in [([0.0, 1.0], 1.0), ([0.0, 0.5], 2.0)] {
+            let straight = Curve { numerator: curve, denominator: [0.0, 0.0, 1.0] };
+            assert_eq!(straight.white(), white, "of a straight line");
+        }
+        let endless = Curve { numerator: [0.0, 1.0], denominator: [0.0, 1.0, 1.0] };
+        assert_eq!(endless.white(), BRIGHTEST, "never reached");
         let white = tone.apply(Rgb::splat(f32::INFINITY));
         assert!((white - Vec3::ONE).abs().max_element() < 1e-6, "infinitely bright is white, not {white}");
         assert_eq!(tone.apply(Rgb::splat(f32::NAN)), Vec3::ZERO, "not a number is black");
@@ -167,8 +194,9 @@ mod tests {
         };
         for fine in [1, 16] {
             let exposure = Tone::for_mesh(&mesh(fine)).exposure;
-            // Geometric mean of 2 and 8 over equal areas is 4.
-            assert!((exposure - KEY / 4.0).abs() < 1e-5, "{fine} strips gave {exposure}");
+            // Of equal areas of 2 and 8, 45 % and 40 % count: 1 and 3 stops.
+            let mean = (f32::from(45_u8 + 3 * 40) / 85.0).exp2();
+            assert!((exposure - 0.18 / mean).abs() < 1e-5, "{fine} strips gave {exposure}");
         }
         assert_eq!(Tone::for_mesh(&DisplayMesh::default()).exposure, 1.0, "nothing to expose for");
     }
