@@ -55,11 +55,11 @@ fn scene(lamp: Option<(f64, Rgb)>, light: Option<Light>) -> Arc<Scene> {
 }
 
 /// The pixels of a small picture of the middle of the plate.
-fn picture(scene: Arc<Scene>) -> Vec<f32> {
-    let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.1), false, &mut |_| ControlFlow::Continue(()))
+fn picture(scene: &Arc<Scene>) -> Vec<f32> {
+    let solved = Solved::new(Arc::clone(scene), Settings::with_error(0.1), false, &mut |_| ControlFlow::Continue(()))
         .expect("solvable");
     let camera = Camera { eye: EYE.into(), target: [0.0; 3], up: [0.0, 0.0, 1.0], fov_x: 0.2, width: 4, height: 4 };
-    let image = RayCaster::new(&scene, &solved.solution, Mode::Samples).render(&camera, &|_| ());
+    let image = RayCaster::new(scene, &solved.solution, Mode::Samples).render(&camera, &|_| ());
     image.pixels.iter().map(|pixel| pixel.x).collect()
 }
 
@@ -74,7 +74,7 @@ fn truth(irradiance: f32) -> f32 {
 fn lights_without_extent_are_seen_in_narrow_lobes() {
     let light = Light { position: LIGHT, intensity: Rgb::ONE, kind: LightKind::Point };
     let right = truth(1.0 / LIGHT.length_squared() as f32);
-    for found in picture(scene(None, Some(light))) {
+    for found in picture(&scene(None, Some(light))) {
         assert!((found / right - 1.0).abs() < 0.02, "{found} is {right}");
     }
 }
@@ -84,7 +84,7 @@ fn highlights_of_small_lamps_are_free_of_noise() {
     let (half, exitance) = (0.005, 1e4);
     // It takes up so little that few rays of a lobe would meet it.
     let right = truth(exitance * FRAC_1_PI * (4.0 * half * half / LIGHT.length_squared()) as f32);
-    let pixels = picture(scene(Some((half, Rgb::splat(exitance))), None));
+    let pixels = picture(&scene(Some((half, Rgb::splat(exitance))), None));
     for found in &pixels {
         assert!((found / right - 1.0).abs() < 0.05, "{found} is {right} in {pixels:?}");
     }
