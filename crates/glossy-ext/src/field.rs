@@ -54,19 +54,21 @@ pub struct Counters {
     evaluations: AtomicU64,
     samples: AtomicU64,
     clamped: AtomicU64,
+    spared: AtomicU64,
 }
 
 impl Counters {
     /// All of them, to be kept.
-    pub(crate) fn counts(&self) -> [u64; 3] {
-        [&self.evaluations, &self.samples, &self.clamped].map(|counter| counter.load(Ordering::Relaxed))
+    pub(crate) fn counts(&self) -> [u64; 4] {
+        [&self.evaluations, &self.samples, &self.clamped, &self.spared].map(|counter| counter.load(Ordering::Relaxed))
     }
 
     /// Takes over those of a solution that was kept.
-    pub(crate) fn take_over(&self, [evaluations, samples, clamped]: [u64; 3]) {
+    pub(crate) fn take_over(&self, [evaluations, samples, clamped, spared]: [u64; 4]) {
         self.evaluations.store(evaluations, Ordering::Relaxed);
         self.samples.store(samples, Ordering::Relaxed);
         self.clamped.store(clamped, Ordering::Relaxed);
+        self.spared.store(spared, Ordering::Relaxed);
     }
 
     /// BRDF evaluations so far: one per sample and direction.
@@ -79,6 +81,13 @@ impl Counters {
     #[must_use]
     pub fn samples_reflected(&self) -> u64 {
         self.samples.load(Ordering::Relaxed)
+    }
+
+    /// Triangles of directions that were not divided since what differs over them is
+    /// [negligible](hr_diffuse::Arrived::negligible): detail that was skipped.
+    #[must_use]
+    pub fn negligible_detail(&self) -> u64 {
+        self.spared.load(Ordering::Relaxed)
     }
 
     /// How often a reflector did what none can, and was overruled: radiances that were not finite, which became 0, or
@@ -182,17 +191,24 @@ impl<B: Basis> GlossyField<B> {
         }
         // A glossy part may be negative where the diffuse one overestimates; both together are not.
         let (flat, least) = (hierarchy.is_flat(leaf), -arrived.diffuse);
-        Some(Reflection { material, place, incident, narrowest, flat, least })
+        Some(Reflection { material, place, incident, narrowest, flat, least, negligible: arrived.negligible })
     }
 
     /// Represents what a leaf reflects in the basis.
     #[must_use]
     pub fn project(&self, reflection: &Reflection<'_>) -> B {
+        let mut peaks = peaks(reflection);
+        let mut evaluations = 0;
+        if reflection.negligible > 0.0 {
+            evaluations = peaks.len();
+            peaks.retain(|peak| reflection.toward(peak.direction).abs().max_element() > reflection.negligible);
+        }
         let known = Known {
             support: Some(reflection.support()),
             offset: -reflection.least,
-            peaks: &peaks(reflection),
+            peaks: &peaks,
             finest: FINEST * reflection.narrowest,
+            negligible: reflection.negligible,
         };
         let mut overruled = 0;
         let projected = B::project(&self.settings, &known, |direction| {
@@ -201,7 +217,9 @@ impl<B: Basis> GlossyField<B> {
             light
         });
         let count = reflection.incident.len() as u64;
-        self.counters.evaluations.fetch_add(projected.evaluations as u64 * count, Ordering::Relaxed);
+        evaluations += projected.evaluations;
+        self.counters.evaluations.fetch_add(evaluations as u64 * count, Ordering::Relaxed);
+        self.counters.spared.fetch_add(projected.spared as u64, Ordering::Relaxed);
         self.counters.samples.fetch_add(count, Ordering::Relaxed);
         self.counters.clamped.fetch_add(overruled + projected.not_finite as u64, Ordering::Relaxed);
         projected.distribution
@@ -271,6 +289,8 @@ pub struct Reflection<'a> {
     flat: bool,
     /// No less than what cancels the diffuse part.
     least: Rgb,
+    /// What differs by less is not looked at, in the unit of the distribution.
+    negligible: f32,
 }
 
 impl Reflection<'_> {
@@ -365,3 +385,6 @@ impl<B: Basis> LightField for GlossyField<B> {
         exitant.bounds(away)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -267,29 +267,26 @@ impl Haar {
     /// ∫ over the sphere, per steradian of the quantity: of intensity (W/sr), the power (W).
     #[must_use]
     pub fn integral(&self) -> Rgb {
-        self.integrate(&|_| 1.0, &|_| false)
+        self.sum_of_pieces(|triangle, values, splits| triangle.integrate(values, splits, &|_| 1.0).0)
     }
 
     /// ∫ of the quantity times the cosine to `normal` (unit length) over the hemisphere around it: of radiance
     /// (W/(m² sr)), the radiosity (W/m²).
     #[must_use]
     pub fn cosine_integral(&self, normal: Vec3) -> Rgb {
-        let inside = |t: &Triangle| t.corners.iter().all(|c| c.dot(normal) >= 0.0);
-        let outside = |t: &Triangle| t.corners.iter().all(|c| c.dot(normal) <= 0.0);
-        self.integrate(&|d| d.dot(normal).max(0.0), &|t| !inside(t) && !outside(t))
+        self.sum_of_pieces(|triangle, values, splits| {
+            triangle.integrate_above(values, normal, splits, splits + HORIZON_SPLITS)
+        })
     }
 
-    /// Quadrature over the pieces, finer in those where the weight has a kink.
-    fn integrate(&self, weight: &impl Fn(Vec3) -> f32, kink: &impl Fn(&Triangle) -> bool) -> Rgb {
-        if self.vertices.is_empty() {
-            return Rgb::ZERO;
-        }
+    /// Adds up integrals over the pieces, in units of the scale, each by a quadrature over parts from so many splits.
+    fn sum_of_pieces(&self, integral: impl Fn(&Triangle, [DVec3; 3], u32) -> DVec3) -> Rgb {
         let mut sum = DVec3::ZERO;
         self.pieces(&mut |_| true, &mut |triangle, values| {
             // The Jacobian varies by 5.2 over a face of the octahedron; a radius of 15° is little enough for degree 5.
-            let wide = [(0.966, 0), (0.85, 1)].iter().find(|(cos, _)| triangle.cos_radius() >= *cos).map_or(2, |w| w.1);
-            let splits = if kink(triangle) { wide + 2 } else { wide };
-            sum += triangle.integrate(values.map(|v| v.as_dvec3()), splits, weight).0;
+            let splits =
+                [(0.966, 0), (0.85, 1)].iter().find(|(cos, _)| triangle.cos_radius() >= *cos).map_or(2, |w| w.1);
+            sum += integral(triangle, values.map(|v| v.as_dvec3()), splits);
         });
         (sum * f64::from(self.scale)).as_vec3()
     }
@@ -485,6 +482,9 @@ impl Basis for Haar {
         self.bytes()
     }
 }
+
+/// Parts that the horizon cuts are split so many times more: the cosine has a kink there.
+const HORIZON_SPLITS: u32 = 2;
 
 /// Which child holds a point: the one at corner 0, 1, 2, or the one in the middle if none is set.
 ///

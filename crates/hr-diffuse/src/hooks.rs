@@ -138,6 +138,9 @@ pub struct Arrived {
     /// The leaf stands for others, too, whose normals are within this angle (radians) of its own: detail finer than what
     /// that makes of a reflection is lost.
     pub spread: f32,
+    /// Differences of the leaf's exitant light by less than this, W/(m² sr), make no difference to what is asked for: 0
+    /// where everything counts.
+    pub negligible: f32,
 }
 
 impl Arrived {
@@ -150,7 +153,10 @@ impl Arrived {
         if !is_light(self.diffuse) {
             return Some("the diffuse radiance is negative or not finite");
         }
-        (!(0.0..=PI).contains(&self.spread)).then_some("the spread is not within 0…π")
+        if !(0.0..=PI).contains(&self.spread) {
+            return Some("the spread is not within 0…π");
+        }
+        (!(0.0..).contains(&self.negligible)).then_some("what is negligible is negative or no number")
     }
 }
 

@@ -119,6 +119,7 @@ impl<L: LightField> Solver<L> {
         make_room(&mut self.reflected, L::Exitant::default);
         make_room(&mut self.brightest, || 0.0);
         make_room(&mut self.last_reflected, || Rgb::ZERO);
+        make_room(&mut self.last_negligible, || 0.0);
         let count = self.elements.nodes.len();
         let exitant = &mut self.exitant;
         exitant.reflected_as.extend(exitant.reflected_as.len() as u32..count as u32);

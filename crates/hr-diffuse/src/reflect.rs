@@ -14,13 +14,24 @@ use crate::threads::{self, prelude::*};
 use crate::{Cone, Rgb};
 use glam::Vec2;
 use smallvec::SmallVec;
-use std::f32::consts::FRAC_1_PI;
+use std::f32::consts::{FRAC_1_PI, PI};
 use std::ops::ControlFlow;
 
 /// So many leaves at most stand for all that are below a sender.
 const REPRESENTATIVES: usize = 16;
 /// A leaf's light is reflected anew once its irradiance has changed by this share of the error asked for.
 const REFLECT_SHARE: f32 = 1.0;
+
+/// What changes the light that links carry by less than this share of what they may be wrong by is negligible in the light of
+/// the leaves that stand for their senders. These are up to sixteen, and each errs on its own.
+const DETAIL_SHARE: f32 = 0.02;
+/// Of a link that is almost blocked some leaves may see as if it were blocked by no more than this.
+const LEAST_VISIBILITY: f32 = 0.1;
+/// What differs by less than this share of the error asked for, times the mean radiance of diffuse white, is negligible where
+/// leaves themselves are looked at.
+const SHOWN_SHARE: f32 = 0.5;
+/// A leaf is reflected anew where so much less of its light is negligible than when it was reflected.
+const FINER: f32 = 0.5;
 
 /// Leaves that a thread reflects between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 8;
@@ -91,7 +102,7 @@ impl Senders {
             // As if they divided the cone of normals among them. Most normals of a single leaf are nearer to its own.
             let share = if element.child_count == 0 { 0.5 } else { (standing.len() as f32).sqrt().recip() };
             let spread = (element.normals.angle() * share).max(0.0);
-            leaves.extend(standing.iter().map(|&(leaf, _)| Standing { leaf, spread }));
+            leaves.extend(standing.iter().map(|&(leaf, _)| Standing { leaf, spread, negligible: 0.0 }));
         }
         leaves.sort_unstable_by(|a, b| a.leaf.cmp(&b.leaf).then(a.spread.total_cmp(&b.spread)));
         leaves.dedup_by_key(|standing| standing.leaf);
@@ -104,6 +115,8 @@ impl Senders {
 struct Standing {
     leaf: u32,
     spread: f32,
+    /// As in [`Arrived`].
+    negligible: f32,
 }
 
 /// A few of many, in proportion to the area that they stand for.
@@ -154,12 +167,16 @@ impl<L: LightField> Solver<L> {
     fn reflect_standing(&mut self, new: Option<&[Rgb]>, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
         let count = self.elements.nodes.len();
         self.last_reflected.resize(count, Rgb::splat(f32::NEG_INFINITY));
+        self.last_negligible.resize(count, 0.0);
         self.brightest.resize(count, 0.0);
         let (elements, faint) = (&self.elements, &self.faint);
         let senders = Senders::new(elements, &self.links, |leaf| {
             faint[elements.nodes[leaf as usize].material as usize] == Rgb::ZERO
         });
-        let leaves = senders.leaves(elements);
+        let mut leaves = senders.leaves(elements);
+        if self.skips.negligible_detail {
+            self.weigh(&senders, new.is_some(), &mut leaves);
+        }
         if new.is_some() {
             // What they reflected has been shot.
             for &Standing { leaf, .. } in &leaves {
@@ -181,6 +198,30 @@ impl<L: LightField> Solver<L> {
         self.exitant.senders = senders;
         self.refer(&changed);
         !changed.is_empty()
+    }
+
+    /// Finds out which differences of the light of leaves are too small for any link to tell: what a link makes of them counts
+    /// less than what it may be wrong by. `is_new`: it is light that is shot, so that what is negligible adds up.
+    fn weigh(&self, senders: &Senders, is_new: bool, leaves: &mut [Standing]) {
+        let count = self.elements.nodes.len();
+        // By node: the most that a difference of its radiosity counts at the end of a link.
+        let mut by_node = vec![0.0_f32; count];
+        for link in self.links.all() {
+            let passes = link.factor * link.visibility.abs().max(LEAST_VISIBILITY);
+            let most = &mut by_node[link.sender as usize];
+            *most = most.max(self.weight(link.receiver) * passes);
+        }
+        let mut by_leaf = vec![0.0_f32; count];
+        for (node, counts) in by_node.into_iter().enumerate() {
+            for &(leaf, share) in senders.of(node as u32) {
+                let most = &mut by_leaf[leaf as usize];
+                *most = most.max(PI * share * counts);
+            }
+        }
+        let error = DETAIL_SHARE * if is_new { NEW_SHARE } else { 1.0 } * self.link_error(self.settings.error);
+        for Standing { leaf, negligible, .. } in leaves {
+            *negligible = (error / by_leaf[*leaf as usize]).min(f32::MAX);
+        }
     }
 
     /// Finds the node whose leaves stand for each node, and how bright it is at most.
@@ -218,15 +259,17 @@ impl<L: LightField> Solver<L> {
         let mut changed: Vec<Standing> = leaves
             .iter()
             .copied()
-            .filter(|&Standing { leaf, .. }| {
+            .filter(|&Standing { leaf, negligible, .. }| {
                 let now = self.exitant.irradiance[leaf as usize];
                 let change = new.map_or_else(|| now - self.last_reflected[leaf as usize], |new| new[leaf as usize]);
                 let change = change.abs().max_element();
-                !self.skips.converged_leaves || change > tolerance * now.max_element()
+                !self.skips.converged_leaves
+                    || change > tolerance * now.max_element()
+                    || negligible < FINER * self.last_negligible[leaf as usize]
             })
             .collect();
         self.stats.skipped.converged_leaves += (leaves.len() - changed.len()) as u64;
-        let reflect = |&Standing { leaf, spread }: &Standing| {
+        let reflect = |&Standing { leaf, spread, negligible }: &Standing| {
             let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
             let mut node = leaf;
             while node != 0 {
@@ -237,7 +280,7 @@ impl<L: LightField> Solver<L> {
             let element = &elements.nodes[leaf as usize];
             let irradiance = new.unwrap_or(&self.exitant.irradiance)[leaf as usize];
             let diffuse = irradiance * element.reflectance * FRAC_1_PI;
-            self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse, spread })
+            self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse, spread, negligible })
         };
         let mut exitant: Vec<L::Exitant> = Vec::with_capacity(changed.len());
         for part in changed.chunks(BETWEEN_WATCHES * threads::current_num_threads()) {
@@ -247,8 +290,9 @@ impl<L: LightField> Solver<L> {
             exitant.par_extend(part.par_iter().map(reflect));
         }
         changed.truncate(exitant.len());
-        for (Standing { leaf, .. }, exitant) in changed.iter().zip(exitant) {
+        for (Standing { leaf, negligible, .. }, exitant) in changed.iter().zip(exitant) {
             self.reflected[*leaf as usize] = exitant;
+            self.last_negligible[*leaf as usize] = *negligible;
             self.last_reflected[*leaf as usize] = self.exitant.irradiance[*leaf as usize];
         }
         changed.into_iter().map(|standing| standing.leaf).collect()
@@ -260,12 +304,15 @@ impl<L: LightField> Solver<L> {
     pub fn reflect_for_display(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let start = std::time::Instant::now();
         self.last_reflected.resize(self.elements.nodes.len(), Rgb::splat(f32::NEG_INFINITY));
+        self.last_negligible.resize(self.elements.nodes.len(), 0.0);
+        let shown = SHOWN_SHARE * self.settings.error * self.mean_irradiance() * FRAC_1_PI;
+        let negligible = if self.skips.negligible_detail { shown } else { 0.0 };
         let active = |leaf: &u32| self.elements.nodes[*leaf as usize].active;
         let leaves: Vec<Standing> = self
             .elements
             .patch_leaves()
             .filter(active)
-            .map(|leaf| Standing { leaf, spread: self.bend(leaf) })
+            .map(|leaf| Standing { leaf, spread: self.bend(leaf), negligible })
             .collect();
         // Those that stood for others are to show their own detail now.
         for Standing { leaf, .. } in &leaves {

@@ -15,6 +15,8 @@ pub(crate) struct Skips {
     pub(crate) converged_leaves: bool,
     /// A look from each leaf at links that bring next to nothing.
     pub(crate) faint_links: bool,
+    /// Directional detail that makes no difference to what links carry.
+    pub(crate) negligible_detail: bool,
 }
 
 impl Skips {
@@ -26,6 +28,7 @@ impl Skips {
         sealed_sides: true,
         converged_leaves: true,
         faint_links: true,
+        negligible_detail: true,
     };
 }
 

@@ -163,6 +163,8 @@ pub struct Solver<L: LightField = ()> {
     strong: Vec<Rgb>,
     /// Irradiance of each leaf when its light was last reflected by the extension.
     pub(crate) last_reflected: Vec<Rgb>,
+    /// What was negligible of it then ([`Arrived::negligible`](crate::hooks::Arrived)).
+    pub(crate) last_negligible: Vec<f32>,
     /// What has been shot, while light is.
     pub(crate) shot: Option<Shot>,
     /// What links may carry of directional light: see [`columns`](crate::columns).
@@ -247,6 +249,7 @@ impl<L: LightField> Solver<L> {
             faint,
             strong,
             last_reflected: Vec::new(),
+            last_negligible: Vec::new(),
             shot: None,
             most_reflected: FREELY,
             brightest: Vec::new(),
@@ -477,11 +480,10 @@ impl<L: LightField> Solver<L> {
     /// Refines all links to a tolerance.
     fn refine(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let start = Instant::now();
-        let mean = self.mean_irradiance();
         let tolerance = Tolerance {
-            error: LINK_SHARE * pass.tolerance * mean,
+            error: self.link_error(pass.tolerance),
             shadow: if pass.closely || self.edges_known {
-                SHADOW_SHARE * self.settings.error * mean
+                SHADOW_SHARE * self.settings.error * self.mean_irradiance()
             } else {
                 f32::INFINITY
             },
@@ -697,9 +699,20 @@ impl<L: LightField> Solver<L> {
         }
     }
 
+    /// What a link may be wrong by in a pass of this tolerance: irradiance × [`weight`](Self::weight).
+    pub(crate) fn link_error(&self, tolerance: f32) -> f32 {
+        LINK_SHARE * tolerance * self.mean_irradiance()
+    }
+
+    /// What an error of the irradiance of a receiver counts.
+    pub(crate) fn weight(&self, receiver: u32) -> f32 {
+        let element = &self.elements.nodes[receiver as usize];
+        element.importance * (element.area / self.area).sqrt()
+    }
+
     /// Mean irradiance of the surfaces that any light reaches and that reflect any; before there is any, that which the emitted power
     /// would make if it were spread evenly. The measure of every tolerance.
-    fn mean_irradiance(&self) -> f32 {
+    pub(crate) fn mean_irradiance(&self) -> f32 {
         let (mut lit, mut area, mut power) = (0.0_f64, 0.0_f64, 0.0_f64);
         for leaf in self.elements.patch_leaves() {
             let (element, leaf) = (&self.elements.nodes[leaf as usize], leaf as usize);

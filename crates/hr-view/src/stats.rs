@@ -70,6 +70,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "converged_leaves": skipped.converged_leaves,
             "faint_links": skipped.faint_links,
             "shot_links": skipped.shot_links,
+            "negligible_detail": solution.field.counters().negligible_detail(),
         },
         "stopped": stats.stopped,
         "budget_spent": stats.spent.map(|spent| match spent {

@@ -52,11 +52,14 @@ pub struct Known<'a> {
     pub peaks: &'a [Peak],
     /// Angle in radians: what is no wider is not refined any more. 0 to leave that to the settings alone.
     pub finest: f32,
+    /// What differs by no more than this, in the unit of the function, is not refined. Bases that do not adapt take no notice.
+    pub negligible: f32,
 }
 
 impl Known<'_> {
     /// Nothing: the whole sphere, no offset, no peaks.
-    pub const NOTHING: Known<'static> = Known { support: None, offset: Rgb::ZERO, peaks: &[], finest: 0.0 };
+    pub const NOTHING: Known<'static> =
+        Known { support: None, offset: Rgb::ZERO, peaks: &[], finest: 0.0, negligible: 0.0 };
 }
 
 /// A projection and what it took.
@@ -68,6 +71,8 @@ pub struct Projected<B> {
     pub evaluations: usize,
     /// How many of its values were infinite or not a number, and were replaced by 0.
     pub not_finite: usize,
+    /// Triangles that were left as they are only because what differs over them is negligible.
+    pub spared: usize,
     /// Whether refinement stopped because a distribution cannot be larger.
     pub truncated: bool,
 }
@@ -94,7 +99,7 @@ impl<'a, F: FnMut(Vec3) -> Rgb> Sampler<'a, F> {
     /// What came of it.
     pub(crate) fn projected<B>(&self, distribution: B) -> Projected<B> {
         let Self { evaluations, not_finite, .. } = *self;
-        Projected { distribution, evaluations, not_finite, truncated: false }
+        Projected { distribution, evaluations, not_finite, spared: 0, truncated: false }
     }
 
     /// The value in a direction of any length but 0.

@@ -75,11 +75,18 @@ impl Refinement {
     /// so far.
     pub(super) fn is_rough(&self, variation: &Variation, center: Rgb, largest: f32) -> bool {
         let size = center.abs().max_element().max(self.negligible * largest);
-        let spread = (variation.high - variation.low).max_element();
+        let spread = self.spread(variation);
         match self.refiner {
-            Refiner::Relative(epsilon) => spread > epsilon * size,
+            Refiner::Relative(epsilon) | Refiner::Interpolation(epsilon) => spread > epsilon * size,
             Refiner::Absolute(threshold) => spread > threshold,
-            Refiner::Interpolation(epsilon) => variation.deviation > epsilon * size,
+        }
+    }
+
+    /// What differs over a triangle, as the refiner sees it.
+    fn spread(&self, variation: &Variation) -> f32 {
+        match self.refiner {
+            Refiner::Relative(_) | Refiner::Absolute(_) => (variation.high - variation.low).max_element(),
+            Refiner::Interpolation(_) => variation.deviation,
         }
     }
 }
@@ -134,7 +141,7 @@ impl Haar {
         let mut sampler = Sampler::new(f, support);
         let mut mesh = Mesh::new(|p| sampler.at(p));
         let mut findings = vec![Finding::default(); mesh.tris.len()];
-        let mut truncated = false;
+        let (mut truncated, mut spared) = (false, 0);
         // The mesh grows while it is walked, coarse triangles first.
         let mut next = 0;
         while next < mesh.tris.len() {
@@ -156,7 +163,11 @@ impl Haar {
                 && (forced || {
                     let center = center_of(&mut findings[index], &mut sampler, &triangle);
                     let variation = variation(&sampler, &mesh, &tri, &triangle, center);
-                    settings.is_rough(&variation, center + known.offset, sampler.largest)
+                    let middle = center + known.offset;
+                    let is_rough = settings.is_rough(&variation, middle, sampler.largest);
+                    let counts = is_rough && settings.spread(&variation) > known.negligible;
+                    spared += usize::from(is_rough && !counts);
+                    counts
                 });
             if !divide {
                 findings[index].accepted = true;
@@ -171,7 +182,7 @@ impl Haar {
         if settings.preserve_energy {
             keep_means(&mut mesh, &findings, support);
         }
-        Projected { truncated, ..sampler.projected(mesh.pack()) }
+        Projected { truncated, spared, ..sampler.projected(mesh.pack()) }
     }
 }
 

@@ -280,6 +280,28 @@ fn nothing_is_finer_than_asked_for() {
     assert!((ratio - 1.0).abs() < 0.1, "{ratio} of the energy is left");
 }
 
+/// Where nobody minds a difference, none is looked for.
+#[test]
+fn negligible_differences_are_not_refined() {
+    let axis = Vec3::new(0.31, 0.43, 0.57).normalize();
+    let f = lobe(axis, 200.0);
+    let fine = Haar::project(&settings(3, 6, 0.1), &Known::NOTHING, &f);
+    assert_eq!(fine.spared, 0, "everything counts");
+    let coarsest = Haar::project(&settings(3, 3, 0.1), &Known::NOTHING, &f).evaluations;
+    let mut before = fine.evaluations;
+    for negligible in [0.01, 0.03, 0.1] {
+        let made = Haar::project(&settings(3, 6, 0.1), &Known { negligible, ..Known::NOTHING }, &f);
+        assert!(made.spared > 0 && made.evaluations < before, "{} of {before} evaluations", made.evaluations);
+        before = made.evaluations;
+        let off = |d: Vec3| (made.distribution.eval(d) - fine.distribution.eval(d)).abs().x;
+        let worst = directions(20_000).map(off).fold(0.0, f32::max);
+        // What is looked at are middles of triangles and of edges; between them it may differ by a little more.
+        assert!(worst < 2.0 * negligible, "{worst} of the peak, where {negligible} is negligible");
+    }
+    let [least, before, all] = [&coarsest, &before, &fine.evaluations].map(|&evaluations| evaluations as f32);
+    assert!(before - least < 0.5 * (all - least), "{before} of {all} evaluations, {least} at least");
+}
+
 #[test]
 fn refiners_differ_in_the_dark() {
     let axis = Vec3::new(0.2, 0.3, 0.9).normalize();

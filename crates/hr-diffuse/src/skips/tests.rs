@@ -2,6 +2,7 @@ use super::Skips;
 use crate::hooks::{Arrived, Hierarchy, LightField, NodeId, Transfer};
 use crate::links::{Link, Links};
 use crate::refine::Pair;
+use crate::sampling::{hash, unit};
 use crate::{Cone, DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solver, Surface};
 use glam::{DVec3, Vec3};
 use std::f32::consts::FRAC_1_PI;
@@ -182,6 +183,8 @@ fn iterations_that_are_left_out_would_change_nothing() {
 struct Echo {
     material: u32,
     albedo: f32,
+    /// Whether it takes all liberty that it has: each leaf errs by as much as is negligible, up to all of its light.
+    errs: bool,
 }
 
 impl LightField for Echo {
@@ -193,8 +196,14 @@ impl LightField for Echo {
     }
     fn clear(&self, (): &mut ()) {}
     fn receive(&self, (): &mut (), _: &Transfer) {}
-    fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], arrived: Arrived) -> Rgb {
-        arrived.irradiance * (self.albedo * FRAC_1_PI)
+    fn reflect<H: Hierarchy>(&self, _: &H, leaf: NodeId, _: &[&()], arrived: Arrived) -> Rgb {
+        let light = arrived.irradiance * (self.albedo * FRAC_1_PI);
+        let error = light.min(Rgb::splat(arrived.negligible));
+        match (self.errs, unit(hash(leaf.0, 1)) < 0.5) {
+            (false, _) => light,
+            (true, false) => light - error,
+            (true, true) => light + error,
+        }
     }
     fn radiance(&self, exitant: &Rgb, _: Vec3) -> Rgb {
         *exitant
@@ -209,11 +218,33 @@ fn leaves_whose_light_has_settled_change_little() {
     const ERROR: f32 = 0.05;
     let mut input = room();
     input.materials[GREY as usize].reflectance = Rgb::splat(0.3);
-    let field = || Echo { material: GREY, albedo: 0.3 };
+    let field = || Echo { material: GREY, albedo: 0.3, errs: false };
     let with = solve(&input, ERROR, field(), Skips::ALL);
     let without = solve(&input, ERROR, field(), Skips { converged_leaves: false, ..Skips::ALL });
     assert!(with.stats.skipped.converged_leaves > 1000, "{:?}", with.stats.skipped);
     assert_eq!(without.stats.skipped.converged_leaves, 0, "none is skipped");
     let apart = difference(&radiosities(&with), &radiosities(&without), with.exitant.radiosity[0]);
     assert!(apart < ERROR, "{apart} of the mean radiosity");
+}
+
+/// What leaves are told to be negligible makes no difference to the light in the room, though each errs by all of it.
+#[test]
+fn negligible_detail_changes_little() {
+    const ERROR: f32 = 0.1;
+    let mut input = room();
+    input.materials[GREY as usize].reflectance = Rgb::splat(0.3);
+    let field = |errs| Echo { material: GREY, albedo: 0.3, errs };
+    let with = solve(&input, ERROR, field(true), Skips::ALL);
+    let without = solve(&input, ERROR, field(true), Skips { negligible_detail: false, ..Skips::ALL });
+    let exact = solve(&input, ERROR, field(false), Skips { negligible_detail: false, ..Skips::ALL });
+    assert_same(&without, &exact, 0.0);
+    // Of the leaves that stand for others, what is negligible beside their light.
+    let shares: Vec<f32> = (0..with.last_negligible.len())
+        .filter(|&leaf| with.brightest[leaf] > 0.0)
+        .map(|leaf| with.last_negligible[leaf] / with.brightest[leaf])
+        .collect();
+    let much = shares.iter().filter(|&&share| share > 0.1).count();
+    assert!(3 * much > shares.len(), "a tenth of their light is negligible in {much} of {} leaves", shares.len());
+    let apart = difference(&radiosities(&with), &radiosities(&without), with.exitant.radiosity[0]);
+    assert!(apart > 0.0 && apart < 0.5 * ERROR, "{apart} of the mean radiosity");
 }
