@@ -18,7 +18,7 @@ const BETWEEN_WATCHES: usize = 1 << 14;
 
 /// Bytes that are kept for each link, …
 pub(crate) const LINK_BYTES: usize = size_of::<Rgb>() + size_of::<Group>() + push::LINK_BYTES;
-/// … and for each node: its evenly spread light, and as much as leaves have.
+/// … and for each node as much as leaves have: what arrives by group while it is summed up, and the rows.
 pub(crate) const NODE_BYTES: usize = size_of::<[Rgb; GROUPS]>() + size_of::<[f32; GROUPS]>() + push::LEAF_BYTES;
 
 /// Whose light it is: rows of form factors treat them differently.
@@ -79,8 +79,6 @@ pub(crate) struct Gather {
     lit: Vec<f32>,
     /// Irradiance by link.
     arriving: Vec<Rgb>,
-    /// Irradiance through evenly spread links, by node and group: its own and those of all above it.
-    even: Vec<[Rgb; GROUPS]>,
 }
 
 impl Gather {
@@ -99,15 +97,11 @@ impl Gather {
         // The rows of form factors are what would arrive of unit radiosity.
         let shares = links.all().par_iter().zip(&push.spreads).map(|(link, spread)| share(light, link, *spread));
         let shares: Vec<f32> = shares.collect();
-        let even = sums(light.elements, links, &groups, &push.spreads, &shares);
-        let shares = |index: usize| {
-            let [_, shares @ ..] = push.sum(light, links, index, (&groups, &shares, &even));
-            shares
-        };
-        let shares: Vec<[f32; GROUPS - 1]> =
-            (0..push.leaves.len()).into_par_iter().with_min_len(64).map(shares).collect();
+        let shares =
+            push.sums(light, links, (&groups, &shares)).into_iter().map(|[_, shares @ ..]| shares.map(|s| s.max(0.0)));
+        let shares: Vec<[f32; GROUPS - 1]> = shares.collect();
         let rows = balance(light, &push.leaves, &shares, error.is_some());
-        let mut gather = Self { groups, push, rows, lit: Vec::new(), arriving: Vec::new(), even: Vec::new() };
+        let mut gather = Self { groups, push, rows, lit: Vec::new(), arriving: Vec::new() };
         if light.element(0).active {
             gather.lit = gather.lit_areas(light, links);
         }
@@ -171,13 +165,13 @@ impl Gather {
     ) -> Vec<(u32, f32)> {
         let carried = links.all().par_iter().zip(&self.push.spreads).map(|(link, spread)| of(link, *spread));
         let carried: Vec<f32> = carried.collect();
-        let even = sums(light.elements, links, &self.groups, &self.push.spreads, &carried);
-        let brought = |index: usize| {
-            let sums = self.push.sum(light, links, index, (&self.groups, &carried, &even));
-            let sum = sums.iter().zip(self.rows[index]).map(|(sum, factor)| sum * factor).sum();
-            (self.push.leaves[index], sum)
+        let sums = self.push.sums(light, links, (&self.groups, &carried));
+        let brought = |(sums, rows): ([f32; GROUPS], &[f32; GROUPS])| {
+            let sum: f32 = sums.iter().zip(rows).map(|(sum, factor)| sum * factor).sum();
+            sum.max(0.0)
         };
-        (0..self.push.leaves.len()).into_par_iter().with_min_len(64).map(brought).collect()
+        let brought = sums.into_iter().zip(&self.rows).map(brought);
+        self.push.leaves.iter().copied().zip(brought).collect()
     }
 
     /// See [`Push::grafted`].
@@ -186,20 +180,37 @@ impl Gather {
     }
 
     /// See [`Push::looked_at`].
-    pub(crate) fn looked_at(&self, elements: &Elements, links: &Links, leaf: u32) -> Vec<(usize, f32)> {
-        self.push.looked_at(elements, links, leaf)
+    pub(crate) fn looked_at(&self, elements: &Elements, leaf: u32) -> Vec<(usize, f32)> {
+        self.push.looked_at(elements, leaf)
     }
 
     /// What links deliver: [`lit`](Self::lit).
     fn lit_areas<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<f32> {
+        let nodes = &light.elements.nodes;
         let mut lit = vec![0.0; links.all().len()];
+        // By node and group: area of the leaves below, times what lets light through.
+        let mut open = vec![[0.0; GROUPS]; nodes.len()];
         for (index, &leaf) in self.push.leaves.iter().enumerate() {
-            let area = light.element(leaf).area;
-            let row = self.rows[index];
-            self.push.each_weight(light, links, index, |at, weight| {
-                let let_through = visible(&links.all()[at], self.push.spreads[at]);
-                lit[at] += area * weight * let_through * row[self.groups[at] as usize];
-            });
+            let row = self.rows[index].map(|factor| factor * light.element(leaf).area);
+            self.push.each_weight(light, links, index, |at, weight| lit[at] += weight * row[self.groups[at] as usize]);
+            open[leaf as usize] = row;
+        }
+        for node in (1..nodes.len()).rev() {
+            let below = open[node];
+            let above = &mut open[nodes[node].parent as usize];
+            above.iter_mut().zip(below).for_each(|(above, below)| *above += below);
+        }
+        for (at, (link, &spread)) in links.all().iter().zip(&self.push.spreads).enumerate() {
+            let receiver = light.element(link.receiver);
+            let oriented = match spread {
+                Spread::Exact => lit[at],
+                Spread::Even => open[link.receiver as usize][self.groups[at] as usize],
+                Spread::Plain => {
+                    let direction = light.direction_to(receiver.center, link.sender);
+                    open[link.receiver as usize][self.groups[at] as usize] * receiver.mean_cosine(direction)
+                }
+            };
+            lit[at] = oriented * visible(link, spread);
         }
         lit
     }
@@ -245,7 +256,6 @@ impl Gather {
             let evaluated = irradiances.par_iter_mut().zip(links).zip(spreads).with_min_len(256);
             evaluated.for_each(|((irradiance, link), spread)| *irradiance = carried(light, link, *spread, shot));
         }
-        self.even = sums(light.elements, links, &self.groups, &self.push.spreads, &arriving);
         self.arriving = arriving;
         self.receive(light, links, &self.arriving, incident, watch)
     }
@@ -296,17 +306,16 @@ impl Gather {
 
     /// Irradiance of all leaves.
     pub(crate) fn push<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, Rgb)> {
-        let leaf = |index: usize| {
-            let sums = self.push.sum(light, links, index, (&self.groups, &self.arriving, &self.even));
-            let irradiance = sums.iter().zip(self.rows[index]).map(|(sum, factor)| *sum * factor).sum();
-            (self.push.leaves[index], irradiance)
+        let sums = self.push.sums(light, links, (&self.groups, &self.arriving));
+        let irradiance = |(sums, rows): ([Rgb; GROUPS], &[f32; GROUPS])| -> Rgb {
+            sums.into_iter().zip(rows).map(|(sum, factor)| sum * *factor).sum()
         };
-        (0..self.push.leaves.len()).into_par_iter().with_min_len(64).map(leaf).collect()
+        self.push.leaves.iter().copied().zip(sums.into_iter().zip(&self.rows).map(irradiance)).collect()
     }
 }
 
 /// Irradiance that a link carries, or what it carries of light that has not been shot yet.
-fn carried<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread, shot: Option<&Shot>) -> Rgb {
+pub(crate) fn carried<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread, shot: Option<&Shot>) -> Rgb {
     let visible = link.factor * visible(link, spread);
     if visible <= 0.0 || shot.is_some_and(|shot| !shot.shoots[link.sender as usize]) {
         return Rgb::ZERO;
@@ -317,7 +326,7 @@ fn carried<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread, shot
 }
 
 /// What a link carries of unit radiosity, from senders that have any.
-fn share<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> f32 {
+pub(crate) fn share<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> f32 {
     let sender = light.element(link.sender);
     if light.emitted_most(link.sender) <= 0.0 {
         return 0.0;
@@ -328,29 +337,4 @@ fn share<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> f32
     }
     let direction = light.direction_to(light.element(link.receiver).center, link.sender);
     visible * sender.mean_cosine(-direction)
-}
-
-/// What the evenly spread links of each node and of all above it carry in sum, by group.
-fn sums<T: Copy + Default + Send + Sync + std::ops::AddAssign>(
-    elements: &Elements,
-    links: &Links,
-    groups: &[Group],
-    spreads: &[Spread],
-    arriving: &[T],
-) -> Vec<[T; GROUPS]> {
-    let sum = |node: usize| {
-        let mut sums = [T::default(); GROUPS];
-        for at in links.range(node as u32).filter(|&at| spreads[at] == Spread::Even) {
-            sums[groups[at] as usize] += arriving[at];
-        }
-        sums
-    };
-    let mut sums: Vec<[T; GROUPS]> = (0..elements.nodes.len()).into_par_iter().with_min_len(256).map(sum).collect();
-    for node in 1..sums.len() {
-        let above = sums[elements.nodes[node].parent as usize];
-        for (sum, above) in sums[node].iter_mut().zip(above) {
-            *sum += above;
-        }
-    }
-    sums
 }

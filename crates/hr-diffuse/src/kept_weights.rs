@@ -59,7 +59,7 @@ impl KeptWeights {
                 && (self.stays[at] || !self.moved.concerns(light.scene, light.elements, pair));
             stays.then_some((link, weight))
         };
-        self.gather.looked_at(light.elements, &self.links, leaf).into_iter().filter_map(stay).collect()
+        self.gather.looked_at(light.elements, leaf).into_iter().filter_map(stay).collect()
     }
 }
 

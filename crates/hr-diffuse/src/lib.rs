@@ -24,6 +24,7 @@ mod gather;
 pub mod geometry;
 pub mod hierarchy;
 pub mod hooks;
+mod inherited;
 pub mod keep;
 mod kept_weights;
 mod leaf_rows;

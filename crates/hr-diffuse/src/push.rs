@@ -3,12 +3,14 @@
 //! A link holds the mean over the node that it ends at; a leaf in a corner of it sees more of the sender or less, from
 //! another side. So every leaf has a weight for each link above it: what the sender brings to the leaf's own place, over
 //! what it brings to the node. The weights stay the same until links change, and are kept where they fit. Links that bring
-//! next to nothing are spread evenly over flat nodes, and by orientation and distance alone over others.
+//! next to nothing are spread evenly over flat nodes, and by orientation and distance alone over others: see
+//! [`inherited`](crate::inherited).
 
 use crate::NodeId;
 use crate::gather::{GROUPS, Group};
-use crate::hierarchy::{Element, Elements, Kind, SceneData, grafted};
+use crate::hierarchy::{Element, Elements, GRAFT, Kind, SceneData, grafted};
 use crate::hooks::{Hierarchy, LightField};
+use crate::inherited::{Above, Carried, inherit};
 use crate::kept_weights::{KeptWeights, take};
 use crate::links::{Link, Links};
 use crate::sampling::hash;
@@ -61,7 +63,7 @@ pub(crate) enum Spread {
     Even,
     /// By orientation and distance from the sender's middle.
     Plain,
-    /// By what the sender brings to each leaf.
+    /// By each leaf's weight: by what the sender brings there.
     Exact,
 }
 
@@ -81,8 +83,12 @@ pub(crate) struct Push {
     pub(crate) rays: u64,
     /// Where the weights of each leaf begin; as many leaves as have kept ones, and the end of the last.
     first: Vec<usize>,
-    /// By leaf, then by node from the leaf up to the root, then by those links of the node that are not spread evenly.
+    /// By leaf, then by node from the leaf up to the root, then by those links of the node that have weights.
     weights: Vec<f32>,
+    /// Links that have weights, in order.
+    weighted: Vec<u32>,
+    /// By node, where in `weighted` its own begin; and the end of the last.
+    first_weighted: Vec<u32>,
 }
 
 impl Push {
@@ -96,8 +102,7 @@ impl Push {
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
         let leaves: Vec<u32> = light.elements.patch_leaves().collect();
-        let spreads = links.all().par_iter().with_min_len(256).map(|link| spread(light, link, error));
-        let (spreads, means) = spreads.unzip();
+        let (spreads, means) = spreads(light, links, error);
         let mut push = Self {
             leaves,
             spreads,
@@ -107,6 +112,8 @@ impl Push {
             rays: 0,
             first: vec![0],
             weights: Vec::new(),
+            weighted: Vec::new(),
+            first_weighted: vec![0],
         };
         if error.is_some() {
             let faint =
@@ -116,7 +123,11 @@ impl Push {
         // How many weights a leaf has, by node: its own and those of all above it.
         let mut counts = vec![0_u32; light.elements.nodes.len()];
         for (node, element) in light.elements.nodes.iter().enumerate() {
-            let own = push.spreads[links.range(node as u32)].iter().filter(|s| **s != Spread::Even).count() as u32;
+            let own = links.range(node as u32).filter(|&at| push.spreads[at] == Spread::Exact).map(|at| at as u32);
+            push.weighted.extend(own);
+            let end = push.weighted.len() as u32;
+            let own = end - push.first_weighted[node];
+            push.first_weighted.push(end);
             counts[node] = own + if node > 0 { counts[element.parent as usize] } else { 0 };
         }
         let kept = MOST_KEPT.min((room / size_of::<f32>() as u64) as usize);
@@ -136,7 +147,7 @@ impl Push {
             rest = after;
         }
         let chunk = if error.is_some() { BETWEEN_WATCHES * threads::current_num_threads() } else { parts.len().max(1) };
-        let (mut rays, rough) = (0, known.is_some_and(|known| known.rough));
+        let (mut rays, rough) = (0, error.is_none() || known.is_some_and(|known| known.rough));
         for part in parts.chunks_mut(chunk) {
             if error.is_some() && watch().is_break() {
                 return Self::new(light, links, None, (room, None), watch);
@@ -144,15 +155,14 @@ impl Push {
             let shot = part.par_iter_mut().with_min_len(4).map(|(leaf, weights)| {
                 let (mut slots, mut rays) = (weights.iter_mut(), 0);
                 let mut known = known.map_or_else(Vec::new, |it| it.of(light, *leaf)).into_iter().peekable();
-                push.each(light, links, *leaf, |place, at| {
+                push.each(light, *leaf, |place, at| {
                     if let Some(slot) = slots.next() {
-                        let (link, spread) = (&links.all()[at], push.spreads[at]);
-                        let stays = if spread == Spread::Exact { take(&mut known, link) } else { None };
+                        let link = &links.all()[at];
                         let find = || match rough {
-                            true => (place.plain(light, link, spread), 0),
-                            false => place.weight(light, link, (spread, push.means[at]), rays),
+                            true => (place.plain(light, link), 0),
+                            false => place.weight(light, link, push.means[at], rays),
                         };
-                        let (weight, shot) = stays.map_or_else(find, |weight| (weight, 0));
+                        let (weight, shot) = take(&mut known, link).map_or_else(find, |weight| (weight, 0));
                         *slot = weight;
                         rays += shot;
                     }
@@ -169,28 +179,21 @@ impl Push {
     /// Leaves have the ids that they have after [`Elements::graft`].
     pub(crate) fn grafted(&mut self) {
         self.leaves.iter_mut().for_each(|leaf| *leaf = grafted(*leaf));
+        // The nodes that come in between have no links yet.
+        if let Some(&end) = self.first_weighted.get(1) {
+            self.first_weighted.insert(0, 0);
+            self.first_weighted.insert(GRAFT as usize, end);
+        }
     }
 
     /// Weights of a leaf for links that were looked at closely, by place among `links`: from the leaf up to the root.
-    pub(crate) fn looked_at(&self, elements: &Elements, links: &Links, leaf: u32) -> Vec<(usize, f32)> {
+    pub(crate) fn looked_at(&self, elements: &Elements, leaf: u32) -> Vec<(usize, f32)> {
         let index = self.leaves.binary_search(&leaf).ok();
         let Some(range) = index.and_then(|index| self.first.get(index..index + 2)) else { return Vec::new() };
         let mut weights = self.weights[range[0]..range[1]].iter();
-        let (mut found, mut node) = (Vec::with_capacity(weights.len()), leaf);
-        loop {
-            for at in links.range(node) {
-                if self.spreads[at] != Spread::Even
-                    && let Some(&weight) = weights.next()
-                    && self.spreads[at] == Spread::Exact
-                {
-                    found.push((at, weight));
-                }
-            }
-            if node == 0 {
-                return found;
-            }
-            node = elements.nodes[node as usize].parent;
-        }
+        let mut found = Vec::with_capacity(weights.len());
+        self.weighted_above(elements, leaf, |at| found.extend(weights.next().map(|&weight| (at, weight))));
+        found
     }
 
     /// Bytes of the weights that are kept.
@@ -198,24 +201,26 @@ impl Push {
         size_of_val(self.weights.as_slice()) as u64
     }
 
-    /// Calls `visit` with a leaf's place and every link above it that is not spread evenly.
-    fn each<L: LightField>(&self, light: Light<'_, L>, links: &Links, leaf: u32, mut visit: impl FnMut(&Place, usize)) {
-        let place = Place::new(light, leaf, self.error);
-        let mut node = leaf;
+    /// Calls `visit` with every link above a leaf that has weights, by place among all: from the leaf up to the root.
+    fn weighted_above(&self, elements: &Elements, leaf: u32, mut visit: impl FnMut(usize)) {
+        let mut node = leaf as usize;
         loop {
-            for at in links.range(node) {
-                if self.spreads[at] != Spread::Even {
-                    visit(&place, at);
-                }
-            }
+            let range = self.first_weighted[node] as usize..self.first_weighted[node + 1] as usize;
+            self.weighted[range].iter().for_each(|&at| visit(at as usize));
             if node == 0 {
                 return;
             }
-            node = light.element(node).parent;
+            node = elements.nodes[node].parent as usize;
         }
     }
 
-    /// Calls `visit` with every link above the leaf at an index of `leaves`, and the leaf's weight for it.
+    /// The same with the leaf's place.
+    fn each<L: LightField>(&self, light: Light<'_, L>, leaf: u32, mut visit: impl FnMut(&Place, usize)) {
+        let place = Place::new(light, leaf, self.error);
+        self.weighted_above(light.elements, leaf, |at| visit(&place, at));
+    }
+
+    /// Calls `visit` with every link above the leaf at an index of `leaves` that has weights, and the leaf's weight for it.
     pub(crate) fn each_weight<L: LightField>(
         &self,
         light: Light<'_, L>,
@@ -224,59 +229,30 @@ impl Push {
         mut visit: impl FnMut(usize, f32),
     ) {
         let leaf = self.leaves[index];
-        let place = Place::new(light, leaf, self.error);
-        let kept = self.first.get(index..index + 2).map(|range| &self.weights[range[0]..range[1]]);
-        let mut weights = kept.unwrap_or_default().iter();
-        let mut node = leaf;
-        loop {
-            for at in links.range(node) {
-                let weight = match (self.spreads[at], kept) {
-                    (Spread::Even, _) => 1.0,
-                    (_, Some(_)) => weights.next().copied().unwrap_or_default(),
-                    (spread, None) => place.plain(light, &links.all()[at], spread),
-                };
-                visit(at, weight);
-            }
-            if node == 0 {
-                return;
-            }
-            node = light.element(node).parent;
-        }
+        let Some(range) = self.first.get(index..index + 2) else {
+            return self.each(light, leaf, |place, at| visit(at, place.plain(light, &links.all()[at])));
+        };
+        let mut weights = self.weights[range[0]..range[1]].iter();
+        self.weighted_above(light.elements, leaf, |at| visit(at, weights.next().copied().unwrap_or_default()));
     }
 
-    /// The sum of what arrives at the leaf at an index of `leaves`, by group: through evenly spread links, summed up by
-    /// node in `even`, and through the others, by link in `arriving`.
-    pub(crate) fn sum<L: LightField, T: Copy + std::ops::AddAssign + std::ops::Mul<f32, Output = T>>(
+    /// The sum of what links carry to each leaf, by group.
+    pub(crate) fn sums<L: LightField, T: Carried>(
         &self,
         light: Light<'_, L>,
         links: &Links,
-        index: usize,
-        (groups, arriving, even): (&[Group], &[T], &[[T; GROUPS]]),
-    ) -> [T; GROUPS] {
-        let leaf = self.leaves[index];
-        let mut sums = even[leaf as usize];
-        let Some(range) = self.first.get(index..index + 2) else {
-            self.each(light, links, leaf, |place, at| {
-                let weight = place.plain(light, &links.all()[at], self.spreads[at]);
-                sums[groups[at] as usize] += arriving[at] * weight;
-            });
-            return sums;
-        };
-        let mut weights = self.weights[range[0]..range[1]].iter();
-        let mut node = leaf;
-        loop {
-            for at in links.range(node) {
-                if self.spreads[at] != Spread::Even
-                    && let Some(&weight) = weights.next()
-                {
-                    sums[groups[at] as usize] += arriving[at] * weight;
-                }
+        (groups, carried): (&[Group], &[T]),
+    ) -> Vec<[T; GROUPS]> {
+        let above = Above { links, spreads: &self.spreads, groups, carried };
+        let sums = inherit(light, above, |leaf, inherited| {
+            let element = light.element(leaf);
+            let mut sums = inherited.on(element.center, &element.facing);
+            if let Ok(index) = self.leaves.binary_search(&leaf) {
+                self.each_weight(light, links, index, |at, weight| sums[groups[at] as usize] += carried[at] * weight);
             }
-            if node == 0 {
-                return sums;
-            }
-            node = light.element(node).parent;
-        }
+            sums
+        });
+        sums.into_iter().map(|(_, sums)| sums).collect()
     }
 }
 
@@ -287,21 +263,31 @@ pub(crate) fn is_shared<L: LightField>(light: Light<'_, L>, node: u32) -> bool {
     !element.is_flat() || element.child_count > 0
 }
 
-/// How a link's light is to be spread, and what it brings if it is wholly visible.
+/// By link, how its light is to be spread, and what it brings if it is wholly visible.
+pub(crate) fn spreads<L: LightField>(
+    light: Light<'_, L>,
+    links: &Links,
+    error: Option<f32>,
+) -> (Vec<Spread>, Vec<f32>) {
+    links.all().par_iter().with_min_len(256).map(|link| spread(light, link, error)).unzip()
+}
+
+/// Those of a link.
 fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -> (Spread, f32) {
     let receiver = light.element(link.receiver);
     let even = if receiver.is_flat() || link.visibility == 0.0 { Spread::Even } else { Spread::Plain };
-    let Some(error) = error else { return (even, 0.0) };
     let direction = light.direction_to(receiver.center, link.sender);
     let mean = light.emitted(link.sender, -direction).element_sum() * link.factor;
-    let least = match is_shared(light, link.receiver) {
-        true => FAINT_SHARE * error.sqrt(),
-        false if link.visibility >= 0.0 => OWN_SHARE,
-        // Nothing is left to be found out.
-        false => f32::INFINITY,
+    let least = match (is_shared(light, link.receiver), error) {
+        (true, error) => FAINT_SHARE * error.unwrap_or(1.0).sqrt(),
+        (false, Some(_)) if link.visibility >= 0.0 => OWN_SHARE,
+        // Nothing is left to be found out, or nobody looks.
+        (false, _) => f32::INFINITY,
     };
+    let may_be_visible =
+        if error.is_some() { visible(link, Spread::Exact).max(MAY_BE_VISIBLE) } else { link.visibility.abs() };
     let irradiance = light.exitant.irradiance[link.receiver as usize].element_sum();
-    let closely = mean > 0.0 && mean * visible(link, Spread::Exact).max(MAY_BE_VISIBLE) >= least * irradiance;
+    let closely = mean > 0.0 && irradiance > 0.0 && mean * may_be_visible >= least * irradiance;
     (if closely { Spread::Exact } else { even }, mean)
 }
 
@@ -335,8 +321,8 @@ impl Place {
     }
 
     /// What a link brings to the leaf over what it brings to its receiver, by orientation and distance alone.
-    fn plain<L: LightField>(&self, light: Light<'_, L>, link: &Link, spread: Spread) -> f32 {
-        let known = link.visibility.abs() / visible(link, spread).max(f32::MIN_POSITIVE);
+    fn plain<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> f32 {
+        let known = link.visibility.abs() / visible(link, Spread::Exact);
         self.turned(light, link) * known
     }
 
@@ -352,25 +338,16 @@ impl Place {
 
     /// The same as asked for, and the number of rays shot after so many `before`; `mean` is what the link would bring to its receiver
     /// if it were wholly visible.
-    fn weight<L: LightField>(
-        &self,
-        light: Light<'_, L>,
-        link: &Link,
-        (spread, mean): (Spread, f32),
-        before: u32,
-    ) -> (f32, u32) {
-        if spread != Spread::Exact {
-            return (self.plain(light, link, spread), 0);
-        }
+    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32, before: u32) -> (f32, u32) {
         let element = light.element(self.leaf);
-        let visible = visible(link, spread);
+        let visible = visible(link, Spread::Exact);
         // A leaf that is small or far is told apart by its orientation; so is one that gets next to nothing.
         let sender = light.element(link.sender);
         let apart = sender.center.distance_squared(element.center);
         let reach = element.radius + sender.radius;
         let far = reach * reach < FAR * FAR * apart;
         if far && mean * visible * self.turned(light, link) < self.faint {
-            return (self.plain(light, link, spread), 0);
+            return (self.plain(light, link), 0);
         }
         let shared = is_shared(light, link.receiver);
         let here = if !shared {

@@ -5,21 +5,23 @@
 //! vertex is gathered anew over the links that light its leaf: the geometry is that of the vertex, and visibility
 //! is renewed where a link carries much of the light.
 
-use crate::Rgb;
 use crate::calibrate::{OF_VERTICES, Sums, factors};
-use crate::gather::Group;
+use crate::gather::{Group, carried, share};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
-use crate::links::Links;
+use crate::inherited::{Above, inherit};
+use crate::links::{Link, Links};
+use crate::push::{Spread, spreads};
 use crate::rows::{Correction, Row, look_around};
 use crate::sampling::hash;
 use crate::segments::visibility_at;
 use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
+use crate::{Facing, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
 use std::collections::HashMap;
-use std::ops::ControlFlow;
+use std::ops::{AddAssign, ControlFlow, Mul};
 
 /// Light is gathered this far from a vertex toward the middle of its leaf: on an edge or in a corner of a room the
 /// horizon and the rays would graze the neighbouring surface.
@@ -250,11 +252,12 @@ fn along_edge(a: Vec2, b: Vec2, depth: u32, find: &impl Fn(Vec2) -> Option<u32>,
     }
 }
 
-/// Builds the vertices of a solution and gathers their irradiance. Returns them and the number of rays shot.
+/// Builds the vertices of a solution with a relative error and gathers their irradiance. Returns them and the number of rays shot.
 /// `watch` is told the share that is done; once it breaks, the others take the mean irradiance of the leaves around.
 pub(crate) fn reconstruct<L: LightField>(
     light: Light<'_, L>,
     links: &Links,
+    error: f32,
     watch: &mut dyn FnMut(f32) -> ControlFlow<()>,
 ) -> (Vertices, u64) {
     let mut vertices = lay_out(light.scene, light.elements);
@@ -263,6 +266,8 @@ pub(crate) fn reconstruct<L: LightField>(
     let chunk = BETWEEN_WATCHES * threads::current_num_threads();
     let mut covered = Vec::with_capacity(count);
     let shares = light.reflected_shares();
+    let (spreads, _) = spreads(light, links, Some(error));
+    let (from_afar, near) = inherited(light, (links, &spreads, &shares), &vertices);
     let mut indirect: Vec<f32> = Vec::with_capacity(count);
     for start in (0..count).step_by(chunk) {
         if watch(start as f32 / count as f32).is_break() {
@@ -284,7 +289,9 @@ pub(crate) fn reconstruct<L: LightField>(
                 if around.iter().all(|&leaf| light.element(leaf).importance <= 0.0) {
                     return Gathering::default();
                 }
-                gather_at(light, (links, &shares), vertices.leaf[vertex], vertices.uv[vertex], vertex as u32)
+                let place = (vertices.leaf[vertex], vertices.uv[vertex]);
+                let from_afar = (&from_afar[vertex], near.of(place.0));
+                gather_at(light, (links, &spreads, &shares), place, from_afar, vertex as u32)
             })
             .collect();
         for (vertex, gathering) in (start..end).zip(part) {
@@ -355,37 +362,40 @@ fn uncover(vertices: &mut Vertices, covered: &[bool]) {
 /// Irradiance at a point of a leaf, gathered over all links that light it.
 fn gather_at<L: LightField>(
     light: Light<'_, L>,
-    (links, shares): (&Links, &[f32]),
-    leaf: u32,
-    uv: Vec2,
+    (links, spreads, shares): (&Links, &[Spread], &[f32]),
+    (leaf, uv): (u32, Vec2),
+    (inherited, near): (&[Brought; 3], &[u32]),
     seed: u32,
 ) -> Gathering {
     let element = light.element(leaf);
-    let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
-    let (x, n) = point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET));
+    let (x, n) = inset(light, leaf, uv);
     let mut arriving: SmallVec<[Arriving; 128]> = SmallVec::new();
     let negligible = NEGLIGIBLE * light.exitant.irradiance[leaf as usize].max_element();
-    let mut total = 0.0;
+    let mut total: f32 = inherited.iter().map(|brought| brought.irradiance.max_element()).sum();
+    let mut look = |at: usize| {
+        let link = &links.all()[at];
+        let (irradiance, share) = light.arriving_at(x, n, link.sender, negligible);
+        let most = irradiance.max_element();
+        if most > 0.0 {
+            total += most * link.visibility.abs().max(0.05);
+            arriving.push(Arriving { irradiance, share, visibility: link.visibility, sender: link.sender });
+        }
+    };
     let mut node = leaf;
     loop {
-        for link in links.of(node) {
-            let (irradiance, share) = light.arriving_at(x, n, link.sender, negligible);
-            let most = irradiance.max_element();
-            if most > 0.0 {
-                total += most * link.visibility.abs().max(0.05);
-                arriving.push(Arriving { irradiance, share, visibility: link.visibility, sender: link.sender });
-            }
-        }
+        links.range(node).filter(|&at| !is_inherited(light, node, spreads[at])).for_each(&mut look);
         if node == 0 {
             break;
         }
         node = light.element(node).parent;
     }
+    near.iter().for_each(|&at| look(at as usize));
     // Light whose visibility is known here, and light with the visibility that links have for something larger.
-    let (mut own, mut kept) = ([Rgb::ZERO; 3], [Rgb::ZERO; 3]);
+    let (mut own, mut kept) = ([Rgb::ZERO; 3], inherited.map(|brought| brought.irradiance));
     // What of both has been reflected.
-    let mut reflected = [[0.0; 3]; 2];
-    let (mut rays, mut row) = (0, Row::default());
+    let mut reflected = [[0.0; 3], inherited.map(|brought| brought.indirect)];
+    let [_, emitters, rest] = inherited.map(|brought| brought.share);
+    let (mut rays, mut row) = (0, Row { emitters, own: 0.0, inherited: rest });
     let mut known_here: SmallVec<[u32; 64]> = SmallVec::new();
     let seed = hash(seed, 0x51ed);
     for Arriving { irradiance, share: view, mut visibility, sender } in arriving {
@@ -421,6 +431,113 @@ fn gather_at<L: LightField>(
     let [known, others] = reflected;
     let indirect = (known[1] + others[1] + (known[2] + others[2] * inherited) * rest) * all;
     Gathering { irradiance, indirect, rays, covered: seen.covered }
+}
+
+/// Where light is gathered for a vertex of a leaf: point and normal.
+fn inset<L: LightField>(light: Light<'_, L>, leaf: u32, uv: Vec2) -> (Vec3, Vec3) {
+    let element = light.element(leaf);
+    let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
+    point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET))
+}
+
+/// What links bring, with the visibility that they have.
+#[derive(Clone, Copy, Debug, Default)]
+struct Brought {
+    irradiance: Rgb,
+    /// Share of the view.
+    share: f32,
+    /// What of the irradiance has been reflected before (sum of channels).
+    indirect: f32,
+}
+
+impl Brought {
+    /// The series of [`Inherited`](crate::inherited::Inherited) may tell of less than nothing.
+    fn bounded(self) -> Self {
+        Self {
+            irradiance: self.irradiance.max(Rgb::ZERO),
+            share: self.share.max(0.0),
+            indirect: self.indirect.max(0.0),
+        }
+    }
+}
+
+impl AddAssign for Brought {
+    fn add_assign(&mut self, other: Self) {
+        self.irradiance += other.irradiance;
+        self.share += other.share;
+        self.indirect += other.indirect;
+    }
+}
+
+impl Mul<f32> for Brought {
+    type Output = Self;
+
+    fn mul(self, factor: f32) -> Self {
+        Self { irradiance: self.irradiance * factor, share: self.share * factor, indirect: self.indirect * factor }
+    }
+}
+
+/// Whether vertices inherit what a link of a node brings, where the sender is far.
+fn is_inherited<L: LightField>(light: Light<'_, L>, node: u32, spread: Spread) -> bool {
+    spread == Spread::Plain || spread == Spread::Even && !light.element(node).is_flat()
+}
+
+/// Links of near senders that leaves inherit, by place among all.
+struct Near {
+    all: Vec<u32>,
+    /// By node, where its own begin; and the end of the last.
+    first: Vec<u32>,
+}
+
+impl Near {
+    fn of(&self, leaf: u32) -> &[u32] {
+        &self.all[self.first[leaf as usize] as usize..self.first[leaf as usize + 1] as usize]
+    }
+}
+
+/// By vertex and group (the last two are one), what it inherits from afar; and what there is beside.
+fn inherited<L: LightField>(
+    light: Light<'_, L>,
+    (links, spreads, shares): (&Links, &[Spread], &[f32]),
+    vertices: &Vertices,
+) -> (Vec<[Brought; 3]>, Near) {
+    let brought = |(link, &spread): (&Link, &Spread)| {
+        if !is_inherited(light, link.receiver, spread) {
+            return Brought::default();
+        }
+        let irradiance = carried(light, link, spread, None);
+        let indirect = irradiance.element_sum() * shares[link.sender as usize];
+        Brought { irradiance, share: share(light, link, spread), indirect }
+    };
+    let carried: Vec<Brought> = links.all().par_iter().zip(spreads).map(brought).collect();
+    let groups: Vec<Group> = links.all().par_iter().map(|link| Group::of(light, link.sender)).collect();
+    let mut of_leaf: Vec<(u32, u32)> = vertices.leaf.iter().copied().zip(0..).collect();
+    of_leaf.par_sort_unstable();
+    let above = Above { links, spreads, groups: &groups, carried: &carried };
+    let found = inherit(light, above, |leaf, inherited| {
+        let first = of_leaf.partition_point(|&(other, _)| other < leaf);
+        let mine = of_leaf[first..].iter().take_while(|&&(other, _)| other == leaf);
+        let at_vertex = |&(_, vertex): &(u32, u32)| {
+            let (_, n) = inset(light, leaf, vertices.uv[vertex as usize]);
+            let [lights, emitters, mut rest, faint] = inherited.afar(&Facing::single(n));
+            rest += faint;
+            (vertex, [lights, emitters, rest].map(Brought::bounded))
+        };
+        (mine.map(at_vertex).collect::<SmallVec<[_; 2]>>(), inherited.near().collect::<SmallVec<[u32; 8]>>())
+    });
+    let mut from_afar = vec![[Brought::default(); 3]; vertices.positions.len()];
+    let mut near = Near { all: Vec::new(), first: vec![0; light.elements.nodes.len() + 1] };
+    for (leaf, (brought, links)) in found {
+        near.first[leaf as usize + 1] = links.len() as u32;
+        near.all.extend(links);
+        for (vertex, brought) in brought {
+            from_afar[vertex as usize] = brought;
+        }
+    }
+    for node in 1..near.first.len() {
+        near.first[node] += near.first[node - 1];
+    }
+    (from_afar, near)
 }
 
 /// What was gathered at a vertex; nothing where only black surfaces meet.
@@ -463,14 +580,14 @@ mod tests {
         let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         let mean = |solver: &Solver, links: &Links| {
-            let (vertices, _) = reconstruct(solver.light(), links, &mut |_| ControlFlow::Continue(()));
+            let (vertices, _) = reconstruct(solver.light(), links, 0.05, &mut |_| ControlFlow::Continue(()));
             vertices.irradiance.iter().map(|irradiance| irradiance.x).sum::<f32>() / vertices.irradiance.len() as f32
         };
         let right = mean(&solver, &solver.links);
         let emits = |sender: u32| Group::of(solver.light(), sender) == Group::Emitter;
         let dimmed = solver.links.all().iter().map(|link| {
             let visibility = link.visibility * if emits(link.sender) { 1.0 } else { 0.6 };
-            crate::links::Link { visibility, ..*link }
+            Link { visibility, ..*link }
         });
         let dimmed = Links::new(dimmed.collect(), solver.elements.nodes.len());
         let alone = mean(&solver, &dimmed);

@@ -54,7 +54,7 @@ impl<L: LightField> Solver<L> {
                 self.exitant.indirect[leaf as usize] = indirect;
             }
         }
-        let (vertices, rays) = reconstruct(self.light(), &self.links, &mut |share| {
+        let (vertices, rays) = reconstruct(self.light(), &self.links, error, &mut |share| {
             let answer =
                 watch(&Progress { phase: Phase::Reconstruct, fraction: 0.9 + 0.1 * share, error, links, nodes });
             stopped |= answer.is_break();

@@ -637,7 +637,8 @@ impl<L: LightField> Solver<L> {
     /// Hands light down to the leaves.
     fn push(&mut self) {
         for (leaf, irradiance) in self.gather.push(self.light(), &self.links) {
-            let all = self.shot.as_mut().map_or(irradiance, |shot| shot.receive(leaf, irradiance));
+            // What inherited light tells of a single sender may be less than nothing.
+            let all = self.shot.as_mut().map_or(irradiance.max(Rgb::ZERO), |shot| shot.receive(leaf, irradiance));
             self.exitant.irradiance[leaf as usize] = all;
         }
     }

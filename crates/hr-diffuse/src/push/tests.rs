@@ -22,7 +22,7 @@ fn weights_are_means_over_the_receiver() {
     let mut below = vec![[0.0_f64; 2]; links.all().len()];
     for (index, &leaf) in push.leaves.iter().enumerate() {
         let mut weights = push.weights[push.first[index]..push.first[index + 1]].iter();
-        push.each(light, links, leaf, |_, at| {
+        push.each(light, leaf, |_, at| {
             let weight = weights.next().expect("a weight for each");
             let area = f64::from(light.element(leaf).area);
             below[at][0] += area * f64::from(*weight);
@@ -57,10 +57,9 @@ fn weights_that_are_not_kept_are_found_again() {
     let groups = vec![Group::Rest; links.all().len()];
     let bring = |(link, spread): (&_, &_)| link_share(link, *spread);
     let arriving: Vec<f32> = links.all().iter().zip(&all.spreads).map(bring).collect();
-    let even = vec![[0.0; GROUPS]; light.elements.nodes.len()];
     let (mut apart, mut total) = (0.0, 0.0);
-    for (index, &leaf) in all.leaves.iter().enumerate() {
-        let [kept, found] = [&all, &none].map(|push| push.sum(light, links, index, (&groups, &arriving, &even))[2]);
+    let [kept, found] = [&all, &none].map(|push| push.sums(light, links, (&groups, &arriving)));
+    for (&leaf, ([.., kept, _], [.., found, _])) in all.leaves.iter().zip(kept.into_iter().zip(found)) {
         apart += light.element(leaf).area * (kept - found);
         total += light.element(leaf).area * kept;
     }
@@ -96,12 +95,10 @@ fn links_that_look_blocked_lose_nothing() {
             light.emitted(link.sender, Vec3::Z).element_sum() * link_share(link, *spread)
         };
         let arriving: Vec<f32> = links.all().iter().zip(&push.spreads).map(carries).collect();
-        let (groups, even) = (vec![Group::Rest; links.all().len()], vec![[0.0; GROUPS]; nodes]);
-        let leaf = |index: usize| {
-            let area = light.element(push.leaves[index]).area;
-            area * push.sum(light, &links, index, (&groups, &arriving, &even)).iter().sum::<f32>()
-        };
-        (0..push.leaves.len()).map(leaf).sum::<f32>()
+        let groups = vec![Group::Rest; links.all().len()];
+        let sums = push.sums(light, &links, (&groups, &arriving));
+        let leaf = |(&leaf, sums): (&u32, [f32; GROUPS])| light.element(leaf).area * sums.iter().sum::<f32>();
+        push.leaves.iter().zip(sums).map(leaf).sum::<f32>()
     };
     let (open, blocked) = (brought(|visibility| visibility), brought(|_| 0.0));
     assert!((blocked / open - 1.0).abs() < 0.1, "{blocked} of {open}");
