@@ -393,7 +393,7 @@ fn decide<L: LightField>(
     else {
         return Verdict::Facing;
     };
-    let weight = r.importance * (r.area / tolerance.area).sqrt();
+    let weight = r.weight(tolerance.area);
     let interval = interval(light, pair, &bounds, tolerance.error / weight);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
@@ -498,7 +498,7 @@ fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Toleranc
         return Verdict::SplitBoth;
     }
     // The inside of a curved surface: split while the light that would be lost matters.
-    let weight = element.importance * (element.area / tolerance.area).sqrt();
+    let weight = element.weight(tolerance.area);
     let at_stake = light.emitted_most(node) * weight;
     let splittable = element.is_patch() && element.radius > tolerance.smallest;
     if at_stake > tolerance.error && splittable && !stopped { Verdict::SplitBoth } else { Verdict::Facing }

@@ -96,7 +96,7 @@ fn is_torn<L: LightField>(
     if fan.len() <= 1 + corners || element.importance <= 0.0 || !can_split(element, tolerance) {
         return (false, 0);
     }
-    let weight = element.importance * (element.area / tolerance.area).sqrt();
+    let weight = element.weight(tolerance.area);
     let (mut node, mut rays) = (leaf, 0);
     loop {
         for link in links.of(node).iter().filter(|link| link.visibility >= 0.0) {

@@ -707,8 +707,7 @@ impl<L: LightField> Solver<L> {
 
     /// What an error of the irradiance of a receiver counts.
     pub(crate) fn weight(&self, receiver: u32) -> f32 {
-        let element = &self.elements.nodes[receiver as usize];
-        element.importance * (element.area / self.area).sqrt()
+        self.elements.nodes[receiver as usize].weight(self.area)
     }
 
     /// Mean irradiance of the surfaces that any light reaches and that reflect any; before there is any, that which the emitted power
