@@ -25,7 +25,7 @@ use std::time::Instant;
 /// Length of patches in the scene's unit.
 const FINENESS: f64 = 0.2;
 /// The error that our solver is asked for.
-const ERROR: f32 = 0.05;
+const ERROR: f32 = 0.02;
 
 /// An engine for one of our scenes, as far as it can have one: flat facets that reflect in front.
 fn engine(scene: &Scene, fineness: f64) -> Engine {
