@@ -28,7 +28,7 @@ impl Curve {
         ((x * (a * x + b)) / (x * (c * x + d) + e)).clamp(0.0, 1.0)
     }
 
-    /// Where the curve reaches 1; [`BRIGHTEST`] if it does so farther on or never.
+    /// Where the curve reaches 1; far above 1 where it does so farther on or never.
     #[must_use]
     pub fn white(&self) -> f32 {
         let ([a, b], [c, d, e]) = (self.numerator.map(f64::from), self.denominator.map(f64::from));
