@@ -71,11 +71,11 @@ impl Output {
         Ok(Self::Window)
     }
 
-    /// How glossy light is shown best in it: pixel by pixel where each is computed once, or else in a way that follows the eye.
+    /// How glossy light is shown best in it: pixel by pixel in a single picture, or else in a way that follows the eye at little cost.
     fn mode(&self) -> Mode {
         match self {
-            Self::Image(_) | Self::Frames(_) => Mode::Samples,
-            Self::Html(_) | Self::Export(_) | Self::Window => Mode::Distributions,
+            Self::Image(_) => Mode::Samples,
+            Self::Frames(_) | Self::Html(_) | Self::Export(_) | Self::Window => Mode::Distributions,
         }
     }
 }

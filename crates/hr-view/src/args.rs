@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.json")]
     pub path: Option<PathBuf>,
 
-    /// How glossy light is shown [default: samples for --image and --frames, distributions for what is walked through]
+    /// How glossy light is shown [default: samples for --image, distributions for walks]
     #[arg(long, value_name = "M", value_enum)]
     pub mode: Option<Mode>,
 
