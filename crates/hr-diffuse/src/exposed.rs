@@ -61,7 +61,7 @@ pub(crate) fn expose_again(scene: &SceneData, elements: &mut Elements, of: impl 
 }
 
 /// Whether light that meets a side goes nowhere from there: it is sealed, or the inside of something.
-fn is_dark(scene: &SceneData, elements: &Elements, side: Side) -> bool {
+pub(crate) fn is_dark(scene: &SceneData, elements: &Elements, side: Side) -> bool {
     let material = &scene.materials[scene.surface_materials[(side / 2) as usize] as usize];
     is_back(side) && !material.two_sided || elements.is_sealed(side)
 }

@@ -9,7 +9,6 @@ use crate::flat::{FlatError, Reader, Writer, are_offsets, fits, is_finite};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::links::{Link, Links};
-use crate::reconstruct::{Corner, Vertices};
 use crate::refine::Pair;
 use crate::reflect::Senders;
 use crate::resume::Unfinished;
@@ -17,6 +16,7 @@ use crate::solution::Solution;
 use crate::solver::scene_by;
 use crate::stats::{Skipped, Stats};
 use crate::transport::Exitant;
+use crate::vertices::{Corner, Vertices};
 use crate::visibility::Visibility;
 use crate::{Normalization, Rgb, SceneInput, SolveError};
 use std::io;
@@ -282,8 +282,9 @@ impl Vertices {
         out.put(&self.irradiance)?;
         out.put(&self.leaf)?;
         out.put(&self.uv)?;
-        out.put(&self.fans)?;
-        out.put(&self.first)?;
+        out.put(&self.corners)?;
+        out.put(&self.first_corner)?;
+        out.put(&self.first_fan)?;
         out.put(&self.around)?;
         out.put(&self.first_around)
     }
@@ -295,8 +296,9 @@ impl Vertices {
             irradiance: from.take_finite("irradiances of vertices")?,
             leaf: from.take("leaves of vertices")?,
             uv: from.take_finite("parameters of vertices")?,
-            fans: from.take::<Corner>("fans")?,
-            first: from.take("fans")?,
+            corners: from.take::<Corner>("fans")?,
+            first_corner: from.take("fans")?,
+            first_fan: from.take("fans")?,
             around: from.take("leaves around vertices")?,
             first_around: from.take("leaves around vertices")?,
         };
@@ -307,10 +309,15 @@ impl Vertices {
             elements.nodes.get(leaf as usize).is_some_and(|element| element.is_patch() && element.child_count == 0)
         };
         fits(vertices.leaf.iter().all(is_leaf), "leaves of vertices")?;
-        fits(are_offsets(&vertices.first, elements.nodes.len(), vertices.fans.len()), "fans")?;
+        let fans = vertices.first_corner.len().saturating_sub(1);
+        fits(are_offsets(&vertices.first_corner, fans, vertices.corners.len()), "fans")?;
+        fits(are_offsets(&vertices.first_fan, elements.nodes.len(), fans), "fans")?;
         let is_corner = |corner: &Corner| (corner.vertex as usize) < count && corner.uv.is_finite();
-        fits(vertices.fans.iter().all(is_corner), "fans")?;
-        fits(elements.patch_leaves().all(|leaf| !vertices.fan(leaf).is_empty()), "fans")?;
+        fits(vertices.corners.iter().all(is_corner), "fans")?;
+        fits(
+            elements.patch_leaves().all(|leaf| vertices.fans(leaf).next().is_some_and(|fan| !fan.is_empty())),
+            "fans",
+        )?;
         let around = are_offsets(&vertices.first_around, count, vertices.around.len());
         fits(around && vertices.around.iter().all(is_leaf), "leaves around vertices")?;
         Ok(vertices)

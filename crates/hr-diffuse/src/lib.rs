@@ -4,7 +4,7 @@
 //! The steps and their names are those of Stamminger et al., "Efficient Glossy Global Illumination with
 //! Interactive Viewing", Computer Graphics Forum 19(1), 2000. The way of the light through the modules:
 //! [`scene`] → [`hierarchy`] → ([`oracle`] → refinement → [`links`], with [`form_factor`] and [`visibility`]) →
-//! gather → push → [`hooks`]' reflect → pull ([`solver`]) → [`reconstruct`] → [`solution`].
+//! gather → push → [`hooks`]' reflect → pull ([`solver`]) → values at [`vertices`] → [`solution`].
 //!
 //! # Features
 //! `parallel` (default): all cores, by rayon, in the pool of whoever calls. Without it there is one thread, and the answer
@@ -14,6 +14,7 @@ pub mod budget;
 mod calibrate;
 mod columns;
 pub mod cone;
+mod contacts;
 mod convergence;
 pub mod error;
 mod exposed;
@@ -34,7 +35,7 @@ pub mod oracle;
 mod proofs;
 mod push;
 mod rearrange;
-pub mod reconstruct;
+mod reconstruct;
 mod refine;
 pub mod reflect;
 pub mod relight;
@@ -56,6 +57,7 @@ mod steady;
 pub mod threads;
 pub mod transport;
 mod twins;
+pub mod vertices;
 pub mod visibility;
 
 pub use budget::{Budget, Spent};

@@ -1,13 +1,11 @@
 //! Values at vertices: a smooth reconstruction of the irradiance for display.
 //!
-//! Every leaf is shown as a fan about its middle, through its corners and through the corners that finer
-//! neighbours put on its edges, so that no crack opens where elements of different size meet. The irradiance of a
-//! vertex is gathered anew over the links that light its leaf: the geometry is that of the vertex, and visibility
-//! is renewed where a link carries much of the light.
+//! The irradiance of a vertex is gathered anew over the links that light its leaf: the geometry is that of the vertex, and
+//! visibility is renewed where a link carries much of the light.
 
 use crate::calibrate::{OF_VERTICES, Sums, factors};
+use crate::contacts::Contacts;
 use crate::gather::{Group, carried, share};
-use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::inherited::{Above, inherit};
 use crate::links::{Link, Links};
@@ -17,15 +15,12 @@ use crate::sampling::hash;
 use crate::segments::visibility_at;
 use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
+use crate::vertices::{Vertices, outlines, point_on};
 use crate::{Facing, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
-use std::collections::HashMap;
 use std::ops::{AddAssign, ControlFlow, Mul};
 
-/// Light is gathered this far from a vertex toward the middle of its leaf: on an edge or in a corner of a room the
-/// horizon and the rays would graze the neighbouring surface.
-pub(crate) const INSET: f32 = 0.02;
 /// Rays for a link that carries all of a vertex's light; others in proportion.
 const RAYS: f32 = 96.0;
 /// No link gets more rays than this at one vertex.
@@ -40,217 +35,6 @@ const COVER: f32 = 0.25;
 const MOST_CHANGE: f64 = 1.5;
 /// Vertices that a thread gathers between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 128;
-/// Most finer levels that a neighbour may have.
-const EDGE_DEPTH: u32 = 14;
-
-/// A corner of a leaf's fan.
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Corner {
-    /// Index of the vertex.
-    pub vertex: u32,
-    /// Where it is on the leaf's surface.
-    pub uv: Vec2,
-}
-
-/// The fans of all leaves, and the irradiance at their vertices.
-#[derive(Clone, Debug, Default)]
-pub struct Vertices {
-    /// Positions in unit space.
-    pub positions: Vec<Vec3>,
-    /// Unit normals on the side of the elements that share the vertex.
-    pub normals: Vec<Vec3>,
-    /// Irradiance, W/m².
-    pub irradiance: Vec<Rgb>,
-    /// The smallest leaf at the vertex.
-    pub leaf: Vec<u32>,
-    /// Where the vertex is on that leaf's surface.
-    pub uv: Vec<Vec2>,
-    /// Fan of each node: middle first, then the outline, counter-clockwise in (u, v).
-    pub(crate) fans: Vec<Corner>,
-    pub(crate) first: Vec<u32>,
-    /// Leaves around each vertex.
-    pub(crate) around: Vec<u32>,
-    pub(crate) first_around: Vec<u32>,
-}
-
-impl Vertices {
-    /// A leaf's fan: its middle, then its outline. Empty for other nodes.
-    #[must_use]
-    pub fn fan(&self, leaf: u32) -> &[Corner] {
-        match self.first.get(leaf as usize..leaf as usize + 2) {
-            Some(range) => &self.fans[range[0] as usize..range[1] as usize],
-            None => &[],
-        }
-    }
-
-    /// The leaves that share a vertex.
-    #[must_use]
-    pub fn leaves_around(&self, vertex: u32) -> &[u32] {
-        let range = &self.first_around[vertex as usize..vertex as usize + 2];
-        &self.around[range[0] as usize..range[1] as usize]
-    }
-
-    /// The triangle of a leaf's fan that holds (u, v): its vertices and their weights, which sum to 1.
-    #[must_use]
-    pub fn interpolation(&self, leaf: u32, uv: Vec2) -> [(u32, f32); 3] {
-        let fan = self.fan(leaf);
-        let Some((middle, outline)) = fan.split_first() else { return [(0, 0.0); 3] };
-        let mut best = [(middle.vertex, 1.0), (middle.vertex, 0.0), (middle.vertex, 0.0)];
-        let mut best_low = f32::NEG_INFINITY;
-        for (i, a) in outline.iter().enumerate() {
-            let b = &outline[(i + 1) % outline.len()];
-            let (p, q, r) = (a.uv - middle.uv, b.uv - middle.uv, uv - middle.uv);
-            let area = p.perp_dot(q);
-            if area.abs() <= f32::MIN_POSITIVE {
-                continue;
-            }
-            let (wa, wb) = (r.perp_dot(q) / area, p.perp_dot(r) / area);
-            let low = wa.min(wb).min(1.0 - wa - wb);
-            if low > best_low {
-                best_low = low;
-                best = [(middle.vertex, 1.0 - wa - wb), (a.vertex, wa), (b.vertex, wb)];
-                if low >= 0.0 {
-                    break;
-                }
-            }
-        }
-        if best_low < 0.0 {
-            // Rounding put the point outside of every triangle: the nearest one, without extrapolation.
-            let sum: f32 = best.iter().map(|(_, w)| w.max(0.0)).sum();
-            for (_, w) in &mut best {
-                *w = w.max(0.0) / sum.max(f32::MIN_POSITIVE);
-            }
-        }
-        best
-    }
-}
-
-/// What makes two corners the same vertex: place, normal, material. Exact, as dyadic points on a shared edge are.
-type Key = ([u32; 3], [i8; 3], u32);
-
-fn key(position: Vec3, normal: Vec3, material: u32) -> Key {
-    // Adding zero makes −0 the same as 0.
-    let bits = (position + Vec3::ZERO).to_array().map(f32::to_bits);
-    (bits, (normal * 60.0).round().to_array().map(|c| c as i8), material)
-}
-
-/// A point of an element as display sees it: position and normal on the element's side.
-pub(crate) fn point_on(scene: &SceneData, elements: &Elements, leaf: u32, uv: Vec2) -> (Vec3, Vec3) {
-    let element = &elements.nodes[leaf as usize];
-    let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
-    let position = scene.surfaces()[element.source as usize].point(uv);
-    (position, scene.shading_normal(element.source, uv) * side)
-}
-
-/// Lays out the fans of all leaves; irradiance is zero still.
-pub(crate) fn lay_out(scene: &SceneData, elements: &Elements) -> Vertices {
-    let mut vertices = Vertices::default();
-    let mut index: HashMap<Key, u32> = HashMap::new();
-    let leaves: Vec<u32> = elements.patch_leaves().collect();
-    let mut shared: Vec<(u32, u32)> = Vec::new();
-    for &leaf in &leaves {
-        let element = &elements.nodes[leaf as usize];
-        for uv in scene.surfaces()[element.source as usize].corners(element.domain) {
-            let (position, normal) = point_on(scene, elements, leaf, uv);
-            let next = vertices.positions.len() as u32;
-            let vertex = *index.entry(key(position, normal, element.material)).or_insert(next);
-            if vertex == next {
-                vertices.add(position, normal, leaf, uv);
-            } else if element.area < elements.nodes[vertices.leaf[vertex as usize] as usize].area {
-                vertices.leaf[vertex as usize] = leaf;
-                vertices.uv[vertex as usize] = uv;
-            }
-        }
-    }
-    vertices.first = vec![0; elements.nodes.len() + 1];
-    let mut filled = 0;
-    for &leaf in &leaves {
-        let element = &elements.nodes[leaf as usize];
-        let geometry = &scene.surfaces()[element.source as usize];
-        while filled <= leaf {
-            vertices.first[filled as usize] = vertices.fans.len() as u32;
-            filled += 1;
-        }
-        let corners = geometry.corners(element.domain);
-        let mut outline: SmallVec<[Corner; 12]> = SmallVec::new();
-        for (i, &a) in corners.iter().enumerate() {
-            let b = corners[(i + 1) % corners.len()];
-            let (position, normal) = point_on(scene, elements, leaf, a);
-            if let Some(&vertex) = index.get(&key(position, normal, element.material)) {
-                outline.push(Corner { vertex, uv: a });
-            }
-            let at = |uv: Vec2| {
-                let (position, normal) = point_on(scene, elements, leaf, uv);
-                index.get(&key(position, normal, element.material)).copied()
-            };
-            // An edge that is one point, such as a pole, has no inner vertices.
-            let ends = [at(a), at(b)];
-            let find = |uv: Vec2| at(uv).filter(|vertex| !ends.contains(&Some(*vertex)));
-            along_edge(a, b, EDGE_DEPTH, &find, &mut outline);
-        }
-        let uv = geometry.middle(element.domain);
-        let (position, normal) = point_on(scene, elements, leaf, uv);
-        let middle = vertices.positions.len() as u32;
-        vertices.add(position, normal, leaf, uv);
-        vertices.fans.push(Corner { vertex: middle, uv });
-        shared.push((middle, leaf));
-        shared.extend(outline.iter().map(|corner| (corner.vertex, leaf)));
-        vertices.fans.extend(outline);
-    }
-    while filled as usize <= elements.nodes.len() {
-        vertices.first[filled as usize] = vertices.fans.len() as u32;
-        filled += 1;
-    }
-    shared.sort_unstable();
-    shared.dedup();
-    vertices.first_around = vec![0; vertices.positions.len() + 1];
-    for (vertex, _) in &shared {
-        vertices.first_around[*vertex as usize + 1] += 1;
-    }
-    for i in 0..vertices.positions.len() {
-        vertices.first_around[i + 1] += vertices.first_around[i];
-    }
-    vertices.around = shared.into_iter().map(|(_, leaf)| leaf).collect();
-    vertices
-}
-
-impl Vertices {
-    /// The mean over a leaf of what is known at vertices; `None` for a leaf without extent.
-    fn mean(&self, leaf: u32, values: &[f32]) -> Option<f32> {
-        let (middle, outline) = self.fan(leaf).split_first()?;
-        let value = |corner: &Corner| values[corner.vertex as usize];
-        let (mut sum, mut area) = (0.0, 0.0);
-        for (i, a) in outline.iter().enumerate() {
-            let b = &outline[(i + 1) % outline.len()];
-            let part = (a.uv - middle.uv).perp_dot(b.uv - middle.uv).abs();
-            sum += part * (value(middle) + value(a) + value(b)) / 3.0;
-            area += part;
-        }
-        (area > 0.0).then(|| sum / area)
-    }
-
-    fn add(&mut self, position: Vec3, normal: Vec3, leaf: u32, uv: Vec2) {
-        self.positions.push(position);
-        self.normals.push(normal);
-        self.irradiance.push(Rgb::ZERO);
-        self.leaf.push(leaf);
-        self.uv.push(uv);
-    }
-}
-
-/// Vertices that finer neighbours put between two corners, in order: they lie on dyadic points of the edge.
-fn along_edge(a: Vec2, b: Vec2, depth: u32, find: &impl Fn(Vec2) -> Option<u32>, out: &mut SmallVec<[Corner; 12]>) {
-    if depth == 0 {
-        return;
-    }
-    let uv = 0.5 * (a + b);
-    if let Some(vertex) = find(uv) {
-        along_edge(a, uv, depth - 1, find, out);
-        out.push(Corner { vertex, uv });
-        along_edge(uv, b, depth - 1, find, out);
-    }
-}
 
 /// Builds the vertices of a solution with a relative error and gathers their irradiance. Returns them and the number of rays shot.
 /// `watch` is told the share that is done; once it breaks, the others take the mean irradiance of the leaves around.
@@ -260,14 +44,18 @@ pub(crate) fn reconstruct<L: LightField>(
     error: f32,
     watch: &mut dyn FnMut(f32) -> ControlFlow<()>,
 ) -> (Vertices, u64) {
-    let mut vertices = lay_out(light.scene, light.elements);
+    let contacts = Contacts::new(light.scene, light.elements);
+    let mut layout = outlines(light.scene, light.elements);
+    contacts.cut(light.elements, &mut layout);
+    let mut vertices = layout.fans(light.scene, light.elements);
+    let places = contacts.places(light.elements, &vertices);
     let count = vertices.positions.len();
     let mut rays = 0;
     let chunk = BETWEEN_WATCHES * threads::current_num_threads();
     let mut covered = Vec::with_capacity(count);
     let shares = light.reflected_shares();
     let (spreads, _) = spreads(light, links, Some(error));
-    let (from_afar, near) = inherited(light, (links, &spreads, &shares), &vertices);
+    let (from_afar, near) = inherited(light, (links, &spreads, &shares), (&vertices, &places));
     let mut indirect: Vec<f32> = Vec::with_capacity(count);
     for start in (0..count).step_by(chunk) {
         if watch(start as f32 / count as f32).is_break() {
@@ -289,9 +77,20 @@ pub(crate) fn reconstruct<L: LightField>(
                 if around.iter().all(|&leaf| light.element(leaf).importance <= 0.0) {
                     return Gathering::default();
                 }
-                let place = (vertices.leaf[vertex], vertices.uv[vertex]);
-                let from_afar = (&from_afar[vertex], near.of(place.0));
-                gather_at(light, (links, &spreads, &shares), place, from_afar, vertex as u32)
+                let (afar, seed) = (&from_afar[vertex], seed(vertices.positions[vertex]));
+                let gather = |place: (u32, Vec2)| {
+                    gather_at(light, (links, &spreads, &shares), place, (afar, near.of(place.0)), seed)
+                };
+                let mut gathering = gather((vertices.leaf[vertex], places[vertex]));
+                // What covers one of the leaves around need not cover another.
+                let mut others = contacts.places_around(&vertices, vertex as u32).into_iter();
+                while gathering.covered
+                    && let Some(place) = others.next()
+                {
+                    let other = gather(place);
+                    gathering = Gathering { rays: gathering.rays + other.rays, ..other };
+                }
+                gathering
             })
             .collect();
         for (vertex, gathering) in (start..end).zip(part) {
@@ -345,7 +144,12 @@ fn uncover(vertices: &mut Vertices, covered: &[bool]) {
     for vertex in (0..covered.len() as u32).filter(|&vertex| covered[vertex as usize]) {
         let (mut sum, mut count) = (Rgb::ZERO, 0.0);
         for &leaf in vertices.leaves_around(vertex) {
-            for corner in vertices.fan(leaf).iter().filter(|corner| !covered[corner.vertex as usize]) {
+            for corner in vertices
+                .fans(leaf)
+                .filter(|fan| fan.iter().any(|corner| corner.vertex == vertex))
+                .flatten()
+                .filter(|corner| !covered[corner.vertex as usize])
+            {
                 sum += vertices.irradiance[corner.vertex as usize];
                 count += 1.0;
             }
@@ -368,7 +172,7 @@ fn gather_at<L: LightField>(
     seed: u32,
 ) -> Gathering {
     let element = light.element(leaf);
-    let (x, n) = inset(light, leaf, uv);
+    let (x, n) = point_on(light.scene, light.elements, leaf, uv);
     let mut arriving: SmallVec<[Arriving; 128]> = SmallVec::new();
     let negligible = NEGLIGIBLE * light.exitant.irradiance[leaf as usize].max_element();
     let mut total: f32 = inherited.iter().map(|brought| brought.irradiance.max_element()).sum();
@@ -397,7 +201,6 @@ fn gather_at<L: LightField>(
     let [_, emitters, rest] = inherited.map(|brought| brought.share);
     let (mut rays, mut row) = (0, Row { emitters, own: 0.0, inherited: rest });
     let mut known_here: SmallVec<[u32; 64]> = SmallVec::new();
-    let seed = hash(seed, 0x51ed);
     for Arriving { irradiance, share: view, mut visibility, sender } in arriving {
         let share = irradiance.max_element() / total;
         let partial = visibility > 0.0 && visibility < 1.0;
@@ -433,11 +236,10 @@ fn gather_at<L: LightField>(
     Gathering { irradiance, indirect, rays, covered: seen.covered }
 }
 
-/// Where light is gathered for a vertex of a leaf: point and normal.
-fn inset<L: LightField>(light: Light<'_, L>, leaf: u32, uv: Vec2) -> (Vec3, Vec3) {
-    let element = light.element(leaf);
-    let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
-    point_on(light.scene, light.elements, leaf, uv.lerp(middle, INSET))
+/// Where the random numbers of a vertex begin: those of vertices in the same place, on both sides of a cut, are the same.
+fn seed(position: Vec3) -> u32 {
+    let [x, y, z] = position.to_array().map(f32::to_bits);
+    hash(hash(hash(x, y), z), 0x51ed)
 }
 
 /// What links bring, with the visibility that they have.
@@ -499,7 +301,7 @@ impl Near {
 fn inherited<L: LightField>(
     light: Light<'_, L>,
     (links, spreads, shares): (&Links, &[Spread], &[f32]),
-    vertices: &Vertices,
+    (vertices, places): (&Vertices, &[Vec2]),
 ) -> (Vec<[Brought; 3]>, Near) {
     let brought = |(link, &spread): (&Link, &Spread)| {
         if !is_inherited(light, link.receiver, spread) {
@@ -518,7 +320,7 @@ fn inherited<L: LightField>(
         let first = of_leaf.partition_point(|&(other, _)| other < leaf);
         let mine = of_leaf[first..].iter().take_while(|&&(other, _)| other == leaf);
         let at_vertex = |&(_, vertex): &(u32, u32)| {
-            let (_, n) = inset(light, leaf, vertices.uv[vertex as usize]);
+            let (_, n) = point_on(light.scene, light.elements, leaf, places[vertex as usize]);
             let [lights, emitters, mut rest, faint] = inherited.afar(&Facing::single(n));
             rest += faint;
             (vertex, [lights, emitters, rest].map(Brought::bounded))

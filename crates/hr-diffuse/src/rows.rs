@@ -4,6 +4,7 @@
 //! handful of rays from the vertex itself, which find out how much of the view is taken up by senders at all; in an
 //! enclosure that is all of it, without noise. So no light is lost or made on the way.
 
+use crate::exposed::is_dark;
 use crate::gather::Group;
 use crate::hooks::LightField;
 use crate::sampling::{cosine_direction, hash, point2};
@@ -28,7 +29,7 @@ pub(crate) struct Seen {
     shares: Row,
     /// Whether nothing but senders is seen.
     closed: bool,
-    /// Whether something covers the place: nearly all that is seen is nearer than asked for.
+    /// Whether something covers the place: nearly all that is seen is nearer than asked for, or seen from where no light goes.
     pub(crate) covered: bool,
 }
 
@@ -48,7 +49,8 @@ pub(crate) fn look_around<L: LightField>(
         let u = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + jitter) / GRID as f32;
         let direction = cosine_direction(n, u.x, u.y);
         let Some(hit) = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface) else { continue };
-        close += u32::from(hit.t < near);
+        let side = 2 * hit.surface + u32::from(!hit.front);
+        close += u32::from(hit.t < near || is_dark(light.scene, light.elements, side));
         if let Some(kind) = kind(light, &hit, &own) {
             hits[kind] += 1;
         }

@@ -6,11 +6,11 @@
 
 use crate::hooks::LightField;
 use crate::links::Links;
-use crate::reconstruct::{Corner, INSET, lay_out, point_on};
 use crate::refine::{MutableLight, Tolerance, can_split, estimate};
 use crate::segments::visibility_at;
 use crate::threads::prelude::*;
 use crate::transport::Light;
+use crate::vertices::{Corner, INSET, Outline, outlines, point_on};
 use glam::Vec2;
 use std::ops::ControlFlow;
 
@@ -67,11 +67,10 @@ pub(crate) fn sew<L: LightField>(
 ) -> u64 {
     let mut rays = 0;
     loop {
-        let (reader, vertices) = (light.read(), lay_out(light.scene, light.elements));
-        let leaves: Vec<u32> = reader.elements.patch_leaves().collect();
-        let look = |&leaf: &u32| {
-            let (torn, rays) = is_torn(reader, links, tolerance, leaf, vertices.fan(leaf));
-            (torn.then_some(leaf), u64::from(rays))
+        let (reader, leaves) = (light.read(), outlines(light.scene, light.elements).parts);
+        let look = |(leaf, outline): &(u32, Outline)| {
+            let (torn, rays) = is_torn(reader, links, tolerance, *leaf, outline);
+            (torn.then_some(*leaf), u64::from(rays))
         };
         let looked: Vec<(Option<u32>, u64)> = leaves.par_iter().with_min_len(64).map(look).collect();
         rays += looked.iter().map(|(_, rays)| rays).sum::<u64>();
@@ -89,20 +88,24 @@ fn is_torn<L: LightField>(
     links: &Links,
     tolerance: Tolerance,
     leaf: u32,
-    fan: &[Corner],
+    outline: &[Corner],
 ) -> (bool, u32) {
     let element = light.element(leaf);
-    let corners = light.scene.surfaces()[element.source as usize].corners(element.domain).len();
-    if fan.len() <= 1 + corners || element.importance <= 0.0 || !can_split(element, tolerance) {
+    let geometry = &light.scene.surfaces()[element.source as usize];
+    if outline.len() <= geometry.corners(element.domain).len()
+        || element.importance <= 0.0
+        || !can_split(element, tolerance)
+    {
         return (false, 0);
     }
     let weight = element.weight(tolerance.area);
+    let places = || outline.iter().map(|corner| corner.uv).chain([geometry.middle(element.domain)]);
     let (mut node, mut rays) = (leaf, 0);
     loop {
         for link in links.of(node).iter().filter(|link| link.visibility >= 0.0) {
             let brought = estimate(light, link);
             if weight * brought > tolerance.shadow && counts(light, leaf, brought) {
-                let (edge, shot) = between(light, leaf, link.sender, fan.iter().map(|corner| corner.uv));
+                let (edge, shot) = between(light, leaf, link.sender, places());
                 rays += shot;
                 if weight * brought * edge > tolerance.shadow {
                     return (true, rays);

@@ -3,11 +3,12 @@
 use crate::hierarchy::{Elements, SceneData};
 use crate::hooks::{LightField, NodeId};
 use crate::links::Links;
-use crate::reconstruct::{Vertices, reconstruct};
+use crate::reconstruct::reconstruct;
 use crate::resume::Unfinished;
 use crate::solver::{Phase, Progress, Solver};
 use crate::stats::Stats;
 use crate::transport::{Exitant, Light};
+use crate::vertices::Vertices;
 use crate::{Rgb, visibility::Hit};
 use glam::Vec2;
 use std::ops::ControlFlow;

@@ -6,7 +6,7 @@ use crate::display::{Batch, DisplayMesh};
 use glam::{DVec3, Mat3, Vec2, Vec3};
 use glossy_ext::GlossyField;
 use hr_diffuse::hierarchy::Kind;
-use hr_diffuse::reconstruct::Corner;
+use hr_diffuse::vertices::Corner;
 use hr_diffuse::{Domain, Geometry, Rgb, Shape, Solution, Surface};
 use hr_scene::{Scene, Texture};
 use std::collections::HashMap;
@@ -177,7 +177,7 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// The fan of a leaf.
+    /// The fans of a leaf.
     fn leaf(&mut self, leaf: u32) {
         let solution = self.solution;
         let element = &solution.elements.nodes[leaf as usize];
@@ -200,15 +200,16 @@ impl<'a> Maker<'a> {
             batch: if varies { self.texture_of[element.material as usize] } else { 0 },
             varies,
         };
-        let fan = solution.vertices.fan(leaf);
-        let Some((middle, outline)) = fan.split_first() else { return };
-        if is_round(geometry) {
-            return self.round_leaf(&look, outline, element.domain);
-        }
-        let middle = self.vertex(&look, middle.vertex, middle.uv);
-        let outline: Vec<u32> = outline.iter().map(|c| self.vertex(&look, c.vertex, c.uv)).collect();
-        for (i, &a) in outline.iter().enumerate() {
-            self.emit(&look, [middle, a, outline[(i + 1) % outline.len()]]);
+        for (middle, outline) in solution.vertices.fans(leaf).filter_map(<[Corner]>::split_first) {
+            if is_round(geometry) {
+                self.round_leaf(&look, outline, element.domain);
+                continue;
+            }
+            let middle = self.vertex(&look, middle.vertex, middle.uv);
+            let outline: Vec<u32> = outline.iter().map(|c| self.vertex(&look, c.vertex, c.uv)).collect();
+            for (i, &a) in outline.iter().enumerate() {
+                self.emit(&look, [middle, a, outline[(i + 1) % outline.len()]]);
+            }
         }
     }
 

@@ -73,11 +73,12 @@ impl Anatomy<'_> {
 
     fn outline(&self, out: &mut Vec<Mark>, leaf: u32, color: [f32; 4]) {
         let vertices = &self.solved.solution.vertices;
-        let Some((_, outline)) = vertices.fan(leaf).split_first() else { return };
-        for (i, corner) in outline.iter().enumerate() {
-            let next = &outline[(i + 1) % outline.len()];
-            let ends = [corner, next].map(|c| vertices.positions[c.vertex as usize]);
-            self.line(out, ends, color);
+        for (_, outline) in vertices.fans(leaf).filter_map(<[_]>::split_first) {
+            for (i, corner) in outline.iter().enumerate() {
+                let next = &outline[(i + 1) % outline.len()];
+                let ends = [corner, next].map(|c| vertices.positions[c.vertex as usize]);
+                self.line(out, ends, color);
+            }
         }
     }
 

@@ -1,0 +1,295 @@
+//! Contacts: where one surface stands on another, light ends at a line.
+//!
+//! A wall is bright above a shelf and dark below it. Values at the corners of leaves are drawn out across that line, however
+//! small the leaves are, as teeth of light. So what is shown of a leaf is cut along the lines in which other polygons meet it, and
+//! each part gathers at vertices of its own (discontinuities of degree 0: P. Heckbert, "Discontinuity meshing for radiosity",
+//! Eurographics Workshop on Rendering 1992). Light travels between whole leaves as before.
+
+use crate::geometry::Geometry;
+use crate::hierarchy::{Elements, SceneData};
+use crate::sealed::outward;
+use crate::threads::prelude::*;
+use crate::vertices::{Corner, INSET, Layout, Outline, Vertices};
+use crate::visibility::Region;
+use glam::{Vec2, Vec3};
+use smallvec::{SmallVec, smallvec};
+use std::collections::HashMap;
+
+/// What stands above a leaf by less than this share of its radius …
+const GAP: f32 = 0.02;
+/// … and by less than this, in unit space, touches it.
+const MOST_GAP: f32 = 1e-3;
+/// A line counts from this share of a leaf's radius, …
+const LONG: f32 = 0.2;
+/// … and corners nearer than this share lie on it.
+const ON: f32 = 0.04;
+/// Polygons whose normals' cosine is larger than this lie in one plane.
+const PARALLEL: f32 = 0.97;
+/// Most lines that cut a leaf.
+const MOST_LINES: usize = 4;
+/// How far beyond a line a vertex gathers, as a share of the way to the middle of its part.
+const BEYOND: f32 = 0.05;
+
+/// The plane of a polygon that meets a leaf. Of the two normals it has the one with the first positive component, so that
+/// the parts of a larger polygon agree.
+#[derive(Clone, Copy, Debug)]
+struct Contact {
+    normal: Vec3,
+    height: f32,
+}
+
+impl Contact {
+    /// How far in front of the plane a point is.
+    fn above(&self, x: Vec3) -> f32 {
+        x.dot(self.normal) - self.height
+    }
+}
+
+/// What meets the leaves of a scene: nothing, for most of them.
+#[derive(Debug, Default)]
+pub(crate) struct Contacts {
+    of: HashMap<u32, SmallVec<[Contact; MOST_LINES]>>,
+}
+
+impl Contacts {
+    /// Finds what meets each leaf.
+    pub(crate) fn new(scene: &SceneData, elements: &Elements) -> Self {
+        let leaves: Vec<u32> = elements.patch_leaves().collect();
+        let look = |&leaf: &u32| (leaf, contacts(scene, elements, leaf));
+        let found: Vec<_> = leaves.par_iter().with_min_len(64).map(look).collect();
+        Self { of: found.into_iter().filter(|(_, contacts)| !contacts.is_empty()).collect() }
+    }
+
+    /// Cuts leaves along the lines.
+    pub(crate) fn cut(&self, elements: &Elements, layout: &mut Layout) {
+        if self.of.is_empty() {
+            return;
+        }
+        let Layout { vertices, parts } = layout;
+        let (beside, like, on_edge) = (HashMap::new(), HashMap::new(), HashMap::new());
+        let mut cuts = Cuts { elements, vertices, beside, like, on_edge };
+        for (leaf, outline) in std::mem::take(parts) {
+            let mut pieces: SmallVec<[Outline; 2]> = smallvec![outline];
+            for contact in self.of.get(&leaf).into_iter().flatten() {
+                pieces = pieces.into_iter().flat_map(|piece| cuts.cut(leaf, piece, contact)).collect();
+            }
+            parts.extend(pieces.into_iter().map(|piece| (leaf, piece)));
+        }
+        parts.iter_mut().for_each(|(_, part)| cuts.close(part));
+    }
+
+    /// Where the light of each vertex is gathered, in the parameters of its leaf.
+    pub(crate) fn places(&self, elements: &Elements, vertices: &Vertices) -> Vec<Vec2> {
+        let mut places = vertices.uv.clone();
+        for leaf in elements.patch_leaves() {
+            for (middle, outline) in vertices.fans(leaf).filter_map(<[Corner]>::split_first) {
+                for corner in outline.iter().filter(|corner| vertices.leaf[corner.vertex as usize] == leaf) {
+                    places[corner.vertex as usize] = self.place(vertices, leaf, [middle, corner]);
+                }
+            }
+        }
+        places
+    }
+
+    /// Where it may be gathered instead, on other leaves around.
+    pub(crate) fn places_around(&self, vertices: &Vertices, vertex: u32) -> SmallVec<[(u32, Vec2); 8]> {
+        let others = vertices.leaves_around(vertex).iter().filter(|&&leaf| leaf != vertices.leaf[vertex as usize]);
+        let on_leaf = |&leaf: &u32| {
+            let fans = vertices.fans(leaf).filter_map(<[Corner]>::split_first);
+            let with_vertex = fans.filter_map(move |(middle, outline)| {
+                outline.iter().find(|corner| corner.vertex == vertex).map(|corner| [middle, corner])
+            });
+            with_vertex.map(move |ends| (leaf, self.place(vertices, leaf, ends)))
+        };
+        others.flat_map(on_leaf).collect()
+    }
+
+    /// A little toward the middle of a part of a leaf from a corner of it, and to its side of what meets the leaf.
+    fn place(&self, vertices: &Vertices, leaf: u32, [middle, corner]: [&Corner; 2]) -> Vec2 {
+        let mut share = INSET;
+        for contact in self.of.get(&leaf).into_iter().flatten() {
+            let [from, to] = [corner, middle].map(|at| contact.above(vertices.positions[at.vertex as usize]));
+            let crosses = (from / (from - to)).clamp(0.0, 1.0 - BEYOND);
+            if from.abs() < to.abs() && crosses.is_finite() {
+                share = share.max(BEYOND + if from * to < 0.0 { crosses } else { 0.0 });
+            }
+        }
+        corner.uv.lerp(middle.uv, share)
+    }
+}
+
+/// What meets a leaf.
+fn contacts(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Contact; MOST_LINES]> {
+    let element = &elements.nodes[leaf as usize];
+    let geometry = &scene.surfaces()[element.source as usize];
+    let mut found: SmallVec<[(u32, Contact); MOST_LINES]> = SmallVec::new();
+    if !geometry.is_polygon() || element.importance <= 0.0 {
+        return SmallVec::new();
+    }
+    let normal = element.normals.axis;
+    let height = geometry.point(Vec2::ZERO).dot(normal);
+    let gap = (GAP * element.radius).min(MOST_GAP);
+    let region =
+        Region { bounds: geometry.bounds(element.domain).padded(gap), normal, heights: [height - gap, height + gap] };
+    let outline: SmallVec<[Vec3; 4]> = geometry.corners(element.domain).iter().map(|uv| geometry.point(*uv)).collect();
+    scene.visibility.any_in(&region, |other| {
+        let surface = &scene.surfaces()[other as usize];
+        if other != element.source
+            && let Some(contact) = contact(surface, geometry, normal)
+            && let Some(line) = section(surface, normal, height + gap)
+            && length_within(line, &outline, normal, element.center) > LONG * element.radius
+        {
+            found.push((other, contact));
+        }
+        false
+    });
+    // Two triangles of one polygon are in the same plane.
+    found.sort_by_key(|(other, _)| *other);
+    let mut contacts: SmallVec<[Contact; MOST_LINES]> = SmallVec::new();
+    for (_, contact) in found {
+        let same = |other: &Contact| {
+            contact.normal.dot(other.normal) > PARALLEL
+                && outline.iter().all(|x| (contact.above(*x) - other.above(*x)).abs() < ON * element.radius)
+        };
+        if contacts.len() < MOST_LINES && !contacts.iter().any(same) {
+            contacts.push(contact);
+        }
+    }
+    contacts
+}
+
+/// The plane of a polygon that is not parallel to one with a normal and does not lie beside it, as walls beside floors do.
+fn contact(surface: &Geometry, geometry: &Geometry, normal: Vec3) -> Option<Contact> {
+    let plane = surface.is_polygon().then(|| outward(surface, 0))?;
+    let [low, high] = geometry.heights(plane)?;
+    let height = surface.point(Vec2::ZERO).dot(plane);
+    let beside = ON * (high - low);
+    if plane.dot(normal).abs() > PARALLEL || low > height - beside || high < height + beside {
+        return None;
+    }
+    let sign = plane.to_array().into_iter().find(|c| c.abs() > 1e-3).map_or(1.0, f32::signum);
+    Some(Contact { normal: plane * sign, height: height * sign })
+}
+
+/// Where a polygon that reaches down to a height along a direction, or below it, is cut by the plane there.
+fn section(surface: &Geometry, direction: Vec3, height: f32) -> Option<[Vec3; 2]> {
+    let points = surface.polygon()?;
+    let mut ends: SmallVec<[Vec3; 2]> = SmallVec::new();
+    for (i, &a) in points.iter().enumerate() {
+        let b = points[(i + 1) % points.len()];
+        let [from, to] = [a, b].map(|x| x.dot(direction) - height);
+        if (from < 0.0) != (to < 0.0) {
+            ends.push(a.lerp(b, from / (from - to)));
+        }
+    }
+    ends.get(..2).map(|ends| [ends[0], ends[1]])
+}
+
+/// How much of a line lies within a convex outline around a middle, seen along its normal.
+fn length_within([from, to]: [Vec3; 2], outline: &[Vec3], normal: Vec3, middle: Vec3) -> f32 {
+    let (mut first, mut last) = (0.0_f32, 1.0_f32);
+    for (i, &a) in outline.iter().enumerate() {
+        let b = outline[(i + 1) % outline.len()];
+        let inward = normal.cross(b - a);
+        let inward = if inward.dot(middle - a) < 0.0 { -inward } else { inward };
+        let [start, end] = [from, to].map(|x| inward.dot(x - a));
+        match (start < 0.0, end < 0.0) {
+            (true, true) => return 0.0,
+            (true, false) => first = first.max(start / (start - end)),
+            (false, true) => last = last.min(start / (start - end)),
+            (false, false) => {}
+        }
+    }
+    (last - first).max(0.0) * from.distance(to)
+}
+
+/// Cuts leaves. Leaves beside each other share the vertices on lines.
+struct Cuts<'a> {
+    elements: &'a Elements,
+    vertices: &'a mut Vertices,
+    /// By vertex, plane and side, its like on a side of a line through it.
+    beside: HashMap<(u32, [i8; 3], bool), u32>,
+    /// And by those, the vertex that they are like.
+    like: HashMap<u32, u32>,
+    /// By the edge's end on the same side and its other end.
+    on_edge: HashMap<(u32, u32), u32>,
+}
+
+impl Cuts<'_> {
+    /// The parts of an outline on both sides of a line.
+    fn cut(&mut self, leaf: u32, outline: Outline, contact: &Contact) -> SmallVec<[Outline; 2]> {
+        let near = ON * self.elements.nodes[leaf as usize].radius;
+        let heights = outline.iter().map(|corner| contact.above(self.vertices.positions[corner.vertex as usize]));
+        let heights: SmallVec<[f32; 12]> = heights.map(|above| if above.abs() <= near { 0.0 } else { above }).collect();
+        let mut parts: SmallVec<[Outline; 2]> = SmallVec::new();
+        for front in [true, false] {
+            let is_mine = |above: f32| if front { above > 0.0 } else { above < 0.0 };
+            if !heights.iter().any(|&above| is_mine(above)) {
+                continue;
+            }
+            let mut part = Outline::new();
+            for (i, a) in outline.iter().enumerate() {
+                let next = (i + 1) % outline.len();
+                let (b, from, to) = (&outline[next], heights[i], heights[next]);
+                if is_mine(from) {
+                    part.push(*a);
+                } else if from == 0.0 {
+                    part.push(Corner { vertex: self.beside(leaf, a, contact, front), uv: a.uv });
+                }
+                if from * to < 0.0 {
+                    part.push(self.between(leaf, if is_mine(from) { [a, b] } else { [b, a] }, contact));
+                }
+            }
+            parts.push(part);
+        }
+        if parts.is_empty() { smallvec![outline] } else { parts }
+    }
+
+    /// The like of a corner on one side of a line through it.
+    fn beside(&mut self, leaf: u32, corner: &Corner, contact: &Contact, front: bool) -> u32 {
+        let at = corner.vertex as usize;
+        let like = (self.vertices.positions[at], self.vertices.normals[at]);
+        let plane = contact.normal.to_array().map(|c| (c * 60.0).round() as i8);
+        let next = || self.vertices.add(like, leaf, corner.uv);
+        let vertex = *self.beside.entry((corner.vertex, plane, front)).or_insert_with(next);
+        self.like.insert(vertex, corner.vertex);
+        self.vertices.of_smallest(self.elements, vertex, leaf, corner.uv);
+        vertex
+    }
+
+    /// The vertex where a line crosses an edge, for the part on the side of the edge's first corner.
+    fn between(&mut self, leaf: u32, [mine, other]: [&Corner; 2], contact: &Contact) -> Corner {
+        // From the same end on whichever side, so that no crack opens.
+        let [a, b] = if mine.vertex < other.vertex { [mine, other] } else { [other, mine] };
+        let [from, to] = [a, b].map(|corner| contact.above(self.vertices.positions[corner.vertex as usize]));
+        let share = from / (from - to);
+        let mix = |values: &[Vec3]| values[a.vertex as usize].lerp(values[b.vertex as usize], share);
+        let normal = mix(&self.vertices.normals).normalize_or(self.vertices.normals[a.vertex as usize]);
+        let (like, uv) = ((mix(&self.vertices.positions), normal), a.uv.lerp(b.uv, share));
+        let next = || self.vertices.add(like, leaf, uv);
+        let vertex = *self.on_edge.entry((mine.vertex, other.vertex)).or_insert_with(next);
+        self.vertices.of_smallest(self.elements, vertex, leaf, uv);
+        Corner { vertex, uv }
+    }
+
+    /// Puts the vertices into a part's outline that leaves beside it have on its edges: else what is shown would end there in steps.
+    fn close(&self, part: &mut Outline) {
+        let mut closed = Outline::new();
+        for (i, a) in part.iter().enumerate() {
+            let b = &part[(i + 1) % part.len()];
+            closed.push(*a);
+            let [from, to] = [a, b].map(|corner| self.like.get(&corner.vertex).copied());
+            let ends = (from.unwrap_or(a.vertex), to.unwrap_or(b.vertex));
+            // Beyond the line the other leaf has is what this one ends at.
+            let mine = if from.is_some() { (ends.1, ends.0) } else { ends };
+            let found = self.on_edge.get(&mine).or_else(|| self.on_edge.get(&(mine.1, mine.0)));
+            let Some(&vertex) = found.filter(|&&vertex| vertex != a.vertex && vertex != b.vertex) else { continue };
+            let [start, at, end] = [a.vertex, vertex, b.vertex].map(|vertex| self.vertices.positions[vertex as usize]);
+            let share = start.distance(at) / start.distance(end);
+            if share > 0.0 && share < 1.0 {
+                closed.push(Corner { vertex, uv: a.uv.lerp(b.uv, share) });
+            }
+        }
+        *part = closed;
+    }
+}

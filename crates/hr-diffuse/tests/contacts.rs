@@ -1,0 +1,95 @@
+//! Contacts: light ends at the line in which one surface stands on another.
+
+use glam::{DVec2, DVec3, Vec2};
+use hr_diffuse::{DiffuseMaterial, Light, LightKind, Rgb, SceneInput, Settings, Shape, Solution, Solver, Surface};
+use std::ops::ControlFlow;
+
+/// Side of the wall, which stands in the plane y = 0.
+const SIDE: f64 = 2.0;
+/// How far the shelf reaches out.
+const DEPTH: f64 = 0.3;
+const BULB: DVec3 = DVec3::new(1.1, 0.6, 3.0);
+/// The ends of the shelf, along the wall.
+const SHELVES: [[DVec2; 2]; 2] =
+    [[DVec2::new(0.3, 1.13), DVec2::new(1.7, 1.13)], [DVec2::new(0.35, 0.9), DVec2::new(1.6, 1.35)]];
+
+/// A wall with a black shelf on it, a bulb above.
+fn solution([a, b]: [DVec2; 2]) -> Solution {
+    let at = |p: DVec2, y: f64| DVec3::new(p.x, y, p.y);
+    let (x, z) = (DVec3::X * SIDE, DVec3::Z * SIDE);
+    let wall = Shape::Quad([DVec3::ZERO, z, z + x, x]);
+    let shelf = Shape::Quad([at(a, 0.0), at(b, 0.0), at(b, DEPTH), at(a, DEPTH)]);
+    let material = |reflectance| DiffuseMaterial { reflectance, exitance: Rgb::ZERO, two_sided: true };
+    let input = SceneInput {
+        surfaces: vec![Surface::new(wall, 0), Surface::new(shelf, 1)],
+        materials: vec![material(Rgb::splat(0.5)), material(Rgb::ZERO)],
+        lights: vec![Light { position: BULB, intensity: Rgb::ONE, kind: LightKind::Point }],
+        ..SceneInput::default()
+    };
+    let mut solver = Solver::new(&input, Settings::with_error(0.1), ()).expect("the scene is sound");
+    solver.solve(&mut |_| ControlFlow::Continue(()));
+    solver.finish(&mut |_| ControlFlow::Continue(()))
+}
+
+/// Irradiance at a place on the wall over that without a shelf.
+fn share(solution: &Solution, at: DVec2) -> f64 {
+    let to = BULB - DVec3::new(at.x, 0.0, at.y);
+    let whole = to.y / to.length().powi(3);
+    // The wall's u runs upward, v along x.
+    let uv = Vec2::new((at.y / SIDE) as f32, (at.x / SIDE) as f32);
+    [false, true]
+        .iter()
+        .filter_map(|&back| solution.elements.leaf_at(&solution.scene, 0, back, uv))
+        .map(|leaf| f64::from(solution.irradiance(leaf, uv).x))
+        .fold(0.0, f64::max)
+        / whole
+}
+
+/// Right above a shelf all of the light arrives, and right below it none: but where it cuts off no more than a corner of a leaf.
+#[test]
+fn light_ends_where_surfaces_meet() {
+    const PLACES: u32 = 400;
+    for (shelf @ [a, b], most) in SHELVES.into_iter().zip([0, 32]) {
+        let solution = solution(shelf);
+        let up = (b - a).normalize().perp();
+        let mut wrong = 0;
+        for i in 0..PLACES {
+            // The ends of the shelf may be blurred.
+            let on = a.lerp(b, 0.1 + 0.8 * f64::from(i) / f64::from(PLACES - 1));
+            let is_wrong = [0.003, 0.02, 0.06].iter().any(|apart| {
+                let [above, below] = [1.0, -1.0].map(|side| share(&solution, on + up * (side * apart)));
+                (above - 1.0).abs() > 0.05 || below > 0.05
+            });
+            wrong += u32::from(is_wrong);
+        }
+        assert!(wrong <= most, "{wrong} of {PLACES} places along {shelf:?}");
+    }
+}
+
+/// Whatever is cut, the parts make up the whole.
+#[test]
+fn parts_fill_the_wall() {
+    for shelf in SHELVES {
+        let solution = solution(shelf);
+        let (mut area, mut fans) = (0.0, [0, 0]);
+        for leaf in solution.elements.patch_leaves() {
+            let element = &solution.elements.nodes[leaf as usize];
+            if element.source != 0 || element.kind != hr_diffuse::hierarchy::Kind::Front {
+                continue;
+            }
+            let count = solution.vertices.fans(leaf).count();
+            fans[usize::from(count > 1)] += 1;
+            for fan in solution.vertices.fans(leaf) {
+                let outline = &fan[1..];
+                for (i, a) in outline.iter().enumerate() {
+                    let b = &outline[(i + 1) % outline.len()];
+                    let part = f64::from((a.uv - fan[0].uv).perp_dot(b.uv - fan[0].uv)) / 2.0;
+                    assert!(part > -1e-9, "no triangle is turned over");
+                    area += part;
+                }
+            }
+        }
+        assert!((area - 1.0).abs() < 1e-5, "{area}");
+        assert!(fans[0] > 0 && fans[1] > 0, "some leaves are cut, others are not: {fans:?}");
+    }
+}
