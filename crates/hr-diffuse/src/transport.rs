@@ -1,6 +1,6 @@
 //! The exitant light of every node, and what of it arrives at a point.
 
-use crate::form_factor;
+use crate::form_factor::{self, CURVED_FAR, FAR};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField, NodeId};
 use crate::oracle::spot_ramp;
@@ -15,12 +15,6 @@ const CLUSTER_FAR: f32 = 0.25;
 
 /// Senders that cannot bring more than this share of a place's irradiance are negligible there.
 pub(crate) const NEGLIGIBLE: f32 = 1e-2;
-
-/// Where the radius of a part of a surface is less than this share of its distance, the point kernel replaces the
-/// closed form: its relative error is about the square, under 0.5%.
-const FAR: f32 = 0.07;
-/// The same for parts of curved surfaces, which have no closed form: up to a few percent, either way.
-const CURVED_FAR: f32 = 0.25;
 
 /// Exitant diffuse light per node.
 #[derive(Clone, Debug, Default)]
@@ -204,6 +198,12 @@ impl<L: LightField> Light<'_, L> {
                 cosine.max(0.0) * element.area / (PI * d2 + element.area)
             }
             Kind::Front | Kind::Back => {
+                let geometry = &self.scene.surfaces()[element.source as usize];
+                if geometry.is_polygon() {
+                    let Element { domain, center: middle, radius, area, .. } = element;
+                    let (middle, radius, area, facing) = (*middle, *radius, *area, element.normals.axis);
+                    return form_factor::Flat { geometry, domain, middle, radius, facing, area }.point_factor(x, n);
+                }
                 // Of a curved part the middle bulges out; that of its box is nearer to its centroid.
                 let middle =
                     if element.is_flat() { element.center } else { 0.5 * (element.bounds[0] + element.bounds[1]) };
@@ -221,7 +221,6 @@ impl<L: LightField> Light<'_, L> {
                     let facets = &self.elements.facets[element.facets as usize];
                     return facets.iter().map(|f| form_factor::kernel(x, n, f.point, f.normal * side, f.area)).sum();
                 }
-                let geometry = &self.scene.surfaces()[element.source as usize];
                 form_factor::point_to_surface(geometry, &element.domain, element.kind == Kind::Back, x, n)
             }
         }

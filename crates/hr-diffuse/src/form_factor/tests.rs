@@ -292,3 +292,44 @@ fn pieces_of_a_sphere_add_up_to_it() {
         assert!((sum / exact - 1.0).abs() < 2e-4, "from {x}: {sum} for {exact}");
     }
 }
+
+#[test]
+fn angles_are_those_of_the_arc_tangent() {
+    for i in 0..=100_000 {
+        let expected = f64::from(i) * PI / 1e5;
+        for scale in [1e-150, 1e-6, 1.0, 1e150] {
+            let found = angle(expected.sin().max(0.0) * scale, expected.cos() * scale);
+            assert!((found - expected).abs() < 5e-13, "{found} for {expected}");
+        }
+    }
+}
+
+/// Polygons that are far, halfway and near, above the horizon and across it.
+#[test]
+fn polygons_are_quickly_known_to_a_percent() {
+    let mut seed = 0;
+    let mut next = || {
+        seed += 1;
+        f64::from(crate::sampling::unit(crate::sampling::hash(seed, 0xfa)))
+    };
+    let mut sum = [0.0; 2];
+    for i in 0..20_000 {
+        let (width, apex) = (0.4 + 0.6 * next(), next());
+        let shape = if i % 2 == 0 {
+            Shape::Quad([DVec3::ZERO, DVec3::X, DVec3::new(1.0, width, 0.0), DVec3::new(0.0, width, 0.0)])
+        } else {
+            Shape::Triangle([DVec3::ZERO, DVec3::X, DVec3::new(apex, width, 0.0)])
+        };
+        let polygon = geometry(&Surface::new(shape, 0));
+        let mut direction = || DVec3::new(next() - 0.5, next() - 0.5, next() - 0.5).normalize();
+        let (mut to, n) = (direction(), direction());
+        to.z = to.z.abs() + 0.05;
+        let x = polygon.place(DVec2::splat(0.3)).0 + to * (0.5 + 40.0 * next().powi(3));
+        let exact = point_factor(Part::front(&polygon), x, n, Accuracy::relative(1e-9));
+        let quick = f64::from(point_to_surface(&polygon, &Domain::WHOLE, false, x.as_vec3(), n.as_vec3()));
+        let off = (quick - exact).abs();
+        assert!(off <= 0.01 * exact + 2e-5, "{i}: {quick} for {exact}");
+        sum = [sum[0] + off, sum[1] + exact];
+    }
+    assert!(sum[0] < 1e-3 * sum[1], "on average {} of {}", sum[0], sum[1]);
+}

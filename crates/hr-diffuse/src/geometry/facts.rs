@@ -109,12 +109,17 @@ impl Geometry {
         }
     }
 
-    /// Four points of a part with weights that sum to 1, for means over its area: exact for quadratic functions
-    /// on rectangles.
+    /// Three or four points of a part with weights that sum to 1, for means over its area: exact for quadratic functions on
+    /// triangles and rectangles.
     #[must_use]
     pub fn quadrature(&self, domain: Domain) -> SmallVec<[(Vec2, f32); 4]> {
         if let Self::Triangle(_) = self {
-            return self.split(domain).into_iter().map(|part| (self.middle(part), 0.25)).collect();
+            // Strang and Fix: exact for polynomials of degree 2.
+            let [low, high] = [1.0 / 6.0, 2.0 / 3.0];
+            return [(low, low), (high, low), (low, high)]
+                .iter()
+                .map(|&(s, t)| (domain.lerp(s, t), 1.0 / 3.0))
+                .collect();
         }
         let mut points: SmallVec<[(Vec2, f32); 4]> = smallvec![];
         for t in GAUSS {
