@@ -259,15 +259,16 @@ fn restore_links(nodes: usize, from: &mut Reader<'_>) -> Result<Links, FlatError
 
 impl Unfinished {
     fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
-        out.put(&[self.tolerance, self.found])?;
+        out.put(&[self.tolerance, self.found, f32::from(u8::from(self.in_vain))])?;
         out.put(&self.unlit)?;
         out.put(&self.coarse)
     }
 
     fn restore(nodes: usize, from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "pairs that are not done";
-        let [tolerance, found] = from.take_exactly(WHAT)?;
-        let unfinished = Self { tolerance, found, unlit: from.take(WHAT)?, coarse: from.take(WHAT)? };
+        let [tolerance, found, in_vain] = from.take_exactly(WHAT)?;
+        let in_vain = in_vain != 0.0;
+        let unfinished = Self { tolerance, found, in_vain, unlit: from.take(WHAT)?, coarse: from.take(WHAT)? };
         let is_sound = |pair: &Pair| (pair.receiver as usize) < nodes && (pair.sender as usize) < nodes;
         let pairs = unfinished.unlit.iter().chain(&unfinished.coarse).all(is_sound);
         fits(pairs && tolerance > 0.0 && found >= 0.0, WHAT)?;

@@ -19,12 +19,13 @@ const FIRST: [f32; 4] = [12.0, 6.0, 3.0, 1.5];
 const STEP: f32 = 0.6;
 /// A solution is fine enough if its error was found to be below this share of what was asked for: what was found is uncertain.
 const ACCEPTED: f32 = 0.9;
-/// The next pass aims at this share, …
-const AIM: f32 = 0.6;
-/// … as if the error shrank with the square root of the tolerance, which is halved at least once and so many times at most, …
-const MOST_HALVES: f32 = 3.0;
+/// The next pass aims at that, as if the error shrank with the square root of the tolerance, which is halved at least once and so many
+/// times at most, …
+const MOST_HALVES: f32 = 2.0;
 /// … down to this tolerance over the error asked for: where more error is left it does not come from links that are too coarse.
-const FINEST: f32 = 0.25;
+const FINEST: f32 = 0.375;
+/// Where an error of more than this share is left at half of the tolerance, or less, it does not come from there either.
+const NO_BETTER: f32 = 0.85;
 
 /// What is left to be done of a solution.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +34,8 @@ pub(crate) struct Unfinished {
     pub(crate) tolerance: f32,
     /// The relative error that was found then; infinite where nobody has looked since links were made or things moved.
     pub(crate) found: f32,
+    /// Whether the last pass found hardly less than the one before, of twice the tolerance.
+    pub(crate) in_vain: bool,
     /// Pairs without a link, whose sender was dark.
     pub(crate) unlit: Vec<Pair>,
     /// Pairs whose link is that of a larger one.
@@ -42,7 +45,7 @@ pub(crate) struct Unfinished {
 impl Unfinished {
     /// Nothing is done.
     pub(crate) const fn new(unlit: Vec<Pair>) -> Self {
-        Self { tolerance: f32::INFINITY, found: f32::INFINITY, unlit, coarse: Vec::new() }
+        Self { tolerance: f32::INFINITY, found: f32::INFINITY, in_vain: false, unlit, coarse: Vec::new() }
     }
 
     /// The tolerance of the next pass toward a relative error; `None` where nothing is left to be done.
@@ -53,10 +56,18 @@ impl Unfinished {
             let next = firsts.iter().find(|&&tolerance| tolerance < self.tolerance);
             return Some(next.copied().unwrap_or(self.tolerance));
         }
-        let done = self.found <= ACCEPTED * error || self.tolerance <= FINEST * error;
+        let in_vain = self.in_vain && self.tolerance < error;
+        let done = self.found <= ACCEPTED * error || self.tolerance <= FINEST * error || in_vain;
         // Whole halves, so that what rays happen to find seldom makes another solution.
-        let halves = (2.0 * (self.found / (AIM * error)).log2()).round().clamp(1.0, MOST_HALVES);
+        let halves = (2.0 * (self.found / (ACCEPTED * error)).log2()).round().clamp(1.0, MOST_HALVES);
         (!done).then(|| (self.tolerance * (-halves).exp2()).max(FINEST * error))
+    }
+
+    /// Takes note of a pass, and of the error that was found after it, if anybody looked.
+    pub(crate) fn done(&mut self, tolerance: f32, found: Option<f32>) {
+        let finer = tolerance <= 0.5 * self.tolerance;
+        self.in_vain = finer && found.is_some_and(|found| found > NO_BETTER * self.found);
+        (self.tolerance, self.found) = (tolerance, found.unwrap_or(f32::INFINITY));
     }
 
     /// Looks at pairs with a coarse link as if they had none.
@@ -105,5 +116,36 @@ impl<L: LightField> Solver<L> {
         let mut solver = Self::with_light(scene, elements, exitant, (field, incident, reflected), settings);
         (solver.links, solver.stats, solver.unfinished) = (links, stats, unfinished);
         Ok(solver)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tolerances of the passes, where each of them finds what `found` says of its tolerance.
+    fn passes(error: f32, unfinished: &mut Unfinished, found: impl Fn(f32) -> f32) -> Vec<f32> {
+        let mut passes = Vec::new();
+        while let Some(tolerance) = unfinished.next(error) {
+            let (_, closely) = is_worth(tolerance, error);
+            unfinished.done(tolerance, closely.then(|| found(tolerance)));
+            passes.push(tolerance);
+        }
+        passes
+    }
+
+    #[test]
+    fn passes_end_where_finer_links_bring_nothing() {
+        let firsts = first_tolerances(0.05).to_vec();
+        let mut fine = Unfinished::new(Vec::new());
+        assert_eq!(passes(0.05, &mut fine, |_| 0.02), firsts, "it is fine already");
+        let mut shrinks = Unfinished::new(Vec::new());
+        let more = passes(0.05, &mut shrinks, |tolerance| 0.3 * tolerance.sqrt());
+        assert!(more.len() > firsts.len() && shrinks.found <= 0.05, "as long as it helps: {more:?}");
+        let mut stays = Unfinished::new(Vec::new());
+        let once = passes(0.05, &mut stays, |_| 0.08);
+        assert_eq!(once.len(), firsts.len() + 1, "once to see, and no more: {once:?}");
+        assert_eq!(stays.next(0.05), None);
+        assert!(stays.next(0.01).is_some(), "who asks for much less may have it tried");
     }
 }

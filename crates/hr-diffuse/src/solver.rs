@@ -295,12 +295,12 @@ impl<L: LightField> Solver<L> {
             if stopped || late || self.stats.spent.is_some() && pass.closely {
                 break;
             }
-            self.unfinished.tolerance = tolerance;
-            self.unfinished.found = self.stats.error.unwrap_or(f32::INFINITY);
+            self.unfinished.done(tolerance, self.stats.error);
             number += 1;
         }
         if let Some(before) = goes_on {
             (self.unfinished.tolerance, self.unfinished.found) = before;
+            self.unfinished.in_vain = false;
         }
         if self.stats.iterations == 0 {
             // Whenever it was stopped, there is some light.
