@@ -89,6 +89,11 @@ pub trait Hierarchy: Sync {
         let distance = to.length().max(f32::MIN_POSITIVE);
         (to / distance, (self.radius(sender) / distance).min(1.0).asin())
     }
+    /// The outline of a sender that is a polygon, about its [`center`](Self::center); `None` for all others, which then count
+    /// as disks.
+    fn sides(&self, _sender: NodeId) -> Option<Sides> {
+        None
+    }
     /// Whether a sender is infinitely far: its direction is the same from everywhere.
     fn is_distant(&self, _sender: NodeId) -> bool {
         false
@@ -97,6 +102,17 @@ pub trait Hierarchy: Sync {
     fn is_flat(&self, node: NodeId) -> bool {
         self.material(node).is_some() && self.normals(node).cos_angle > FLAT_COSINE
     }
+}
+
+/// Outline of a flat sender: a trapezoid, the points centre + s (1 − taper t) across + (t + taper/3) along for −1 ≤ s, t ≤ 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sides {
+    /// Half of the mean width.
+    pub across: Vec3,
+    /// Half of the height.
+    pub along: Vec3,
+    /// 0 for a parallelogram, 1 for a triangle.
+    pub taper: f32,
 }
 
 /// Normals within this cosine (0.8°) count as one.

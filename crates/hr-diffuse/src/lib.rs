@@ -48,6 +48,7 @@ mod sealed;
 mod segments;
 mod shadows;
 mod shooting;
+mod sides;
 mod skips;
 pub mod solution;
 pub mod solver;
