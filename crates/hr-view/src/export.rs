@@ -39,6 +39,8 @@ mod vertex_light;
 use crate::ViewError;
 use crate::display::up_of;
 use crate::facets::{Facets, Roundness, facets};
+use crate::glossy::Mode;
+use crate::metering;
 use crate::solved::Solved;
 use crate::window::Tone;
 use glam::{DMat4, DQuat, DVec3};
@@ -91,7 +93,9 @@ pub fn write(solved: &Solved, path: &Path) -> Result<(), ViewError> {
 /// Both scenes.
 fn gltf(solved: &Solved) -> Glb {
     let Facets { mesh, sources, .. } = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
-    let tone = Tone::for_mesh(&mesh);
+    let of_mesh = Tone::for_mesh(&mesh);
+    let metered = metering::exposure(solved, Mode::Distributions, &[solved.scene.default_camera()]);
+    let tone = Tone { exposure: metered.unwrap_or(of_mesh.exposure), ..of_mesh };
     let mut file = Glb::default();
     let place = place(solved, mesh.origin);
     let at_vertices = vertex_light::add(&mut file, solved, &mesh, &sources, &tone);
