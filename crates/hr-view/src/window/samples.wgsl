@@ -15,6 +15,9 @@ const LOSSES = 33u;
 // Bits of the kinds of lobes that there are: the others cost nothing.
 override KINDS: u32 = 15u;
 
+// Whether senders that are polygons have their outline; without it all are disks.
+override OUTLINES: bool = true;
+
 struct Leaf {
     first: u32,
     count: u32,
@@ -156,7 +159,7 @@ fn arrived(a: Arrival, at: vec3f, frame_: mat3x3f, narrowest: f32) -> Incident {
         let share = min(a.area * mean_cosine(a, -direction), a.radius * a.radius) / d2;
         extent = asin(sqrt(min(share, 1.0)));
         renewal = a.spread / (d2 + a.radius * a.radius);
-        if any(a.across != vec3f(0.0)) {
+        if OUTLINES && any(a.across != vec3f(0.0)) {
             let unit = inverseSqrt(d2);
             let across = (a.across - direction * dot(a.across, direction)) * unit;
             let along = (a.along - direction * dot(a.along, direction)) * unit;
