@@ -25,10 +25,13 @@
 //!
 //! Scene 1, `lightmap`, has the surfaces as they came, round ones cut into few triangles, and the light in **images** on
 //! their second set of texture coordinates, `TEXCOORD_1`: the base colour texture is radiance × `extras.exposure` of the
-//! material; `extras.irradiance` names a second texture with the irradiance, and how many W/m² its white stands for. Both
-//! are sRGB-encoded. Each side of each surface has a rectangle of its own, whose border is in the middle of its outermost
+//! material, in 8 bits that are dithered, so that gradients have no steps; `extras.irradiance` names a second texture with the
+//! irradiance, in 16 bits, and how many W/m² its white stands for. Both are sRGB-encoded. Each side of each surface has a rectangle of its own, whose border is in the middle of its outermost
 //! texels, so that surfaces that share an edge of the same length have the same texels on it; what lies around is a copy of
 //! the border, for filters. Sides that reflect and emit nothing are left out.
+//!
+//! # `.exr`: the lightmap as it is
+//! The first of these images, texel by texel, as linear radiance in W/(m² sr), neither exposed nor clamped, in the scene's primaries.
 
 mod glb;
 mod harmonics;
@@ -46,6 +49,7 @@ use crate::window::Tone;
 use glam::{DMat4, DQuat, DVec3};
 use glb::Glb;
 use hr_diffuse::Rgb;
+use hr_scene::ToneMap;
 use hr_scene::whole_file::write_whole;
 use std::f32::consts::FRAC_1_PI;
 use std::path::Path;
@@ -57,6 +61,8 @@ pub enum Format {
     Csv,
     /// Binary glTF.
     Glb,
+    /// OpenEXR.
+    Exr,
 }
 
 impl Format {
@@ -68,8 +74,9 @@ impl Format {
         match path.extension().unwrap_or_default().to_ascii_lowercase().to_str() {
             Some("csv") => Ok(Self::Csv),
             Some("glb") => Ok(Self::Glb),
+            Some("exr") => Ok(Self::Exr),
             _ => Err(ViewError::Arguments(format!(
-                "--export {}: unknown format; end the name with .csv or .glb",
+                "--export {}: unknown format; end the name with .csv, .glb or .exr",
                 path.display()
             ))),
         }
@@ -83,6 +90,7 @@ impl Format {
 pub fn write(solved: &Solved, path: &Path) -> Result<(), ViewError> {
     match Format::of(path)? {
         Format::Csv => Ok(write_whole(path, |out| table::write(solved, out))?),
+        Format::Exr => Ok(lightmap::image(solved).save(path, &ToneMap::default(), solved.scene.primaries)?),
         Format::Glb => {
             let file = gltf(solved);
             Ok(write_whole(path, |out| file.write(out))?)
