@@ -115,6 +115,16 @@ pub struct Sides {
     pub taper: f32,
 }
 
+impl Sides {
+    /// Distance from the centre to the farthest corner.
+    #[must_use]
+    pub fn reach(&self) -> f32 {
+        let Self { across, along, taper } = *self;
+        let corner = |s: f32, t: f32| (across * (s * (1.0 - taper * t)) + along * (t + taper / 3.0)).length();
+        [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)].into_iter().fold(0.0, f32::max)
+    }
+}
+
 /// Normals within this cosine (0.8°) count as one.
 pub const FLAT_COSINE: f32 = 0.9999;
 

@@ -87,10 +87,7 @@ mod tests {
             };
             let area = 4.0 * across.cross(along).length();
             assert!((area / element.area - 1.0).abs() < 1e-4, "element {node}: {area}, not {}", element.area);
-            // The corners are as far from the centre as it says.
-            let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
-                .map(|[s, t]: [f32; 2]| across * (s * (1.0 - taper * t)) + along * (t + taper / 3.0));
-            let reach = corners.iter().map(|c| c.length()).fold(0.0, f32::max);
+            let reach = Sides { across, along, taper }.reach();
             assert!((reach / element.radius - 1.0).abs() < 1e-3, "element {node}: {reach}, not {}", element.radius);
             parts += 1;
         }
