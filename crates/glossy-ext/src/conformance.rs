@@ -296,6 +296,7 @@ impl Check<'_> {
                 direction,
                 extent: [0.0, 0.05, 0.4][k % 3],
                 irradiance: Rgb::new(1.0, 0.5, 0.1 + 0.2 * (k % 5) as f32),
+                ..Incident::default()
             })
             .collect();
         let (mut expected, mut size) = (Rgb::ZERO, Rgb::ZERO);

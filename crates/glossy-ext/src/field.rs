@@ -184,9 +184,9 @@ impl<B: Basis> GlossyField<B> {
         merge_weak(&mut incident);
         // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
         for sample in &mut incident {
-            sample.extent = sample.extent.max(if width < WIDE * narrowest { narrowest } else { 0.0 });
-            if sample.extent * WIDE < width {
-                sample.extent = 0.0;
+            sample.widen(if width < WIDE * narrowest { narrowest } else { 0.0 });
+            if sample.reach() * WIDE < width {
+                sample.shrink();
             }
         }
         // A glossy part may be negative where the diffuse one overestimates; both together are not.

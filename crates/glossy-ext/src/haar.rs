@@ -110,6 +110,18 @@ impl Node {
         self.0 >> 60 == 0
     }
 
+    /// Index of the first child's node, where there is one.
+    #[inline]
+    fn base(self) -> usize {
+        (self.0 >> 45) as usize & 0x7fff
+    }
+
+    /// How many children have a node.
+    #[inline]
+    fn children(self) -> usize {
+        (self.0 >> 60).count_ones() as usize
+    }
+
     /// Index of a child's node.
     #[inline]
     fn child(self, child: usize) -> Option<usize> {
@@ -120,8 +132,7 @@ impl Node {
         // How many of the up to three children before this one have a node: popcounts of 0…7, two bits each.
         const COUNTS: usize = 0b11_10_10_01_10_01_01_00;
         let before = mask & ((1 << child) - 1);
-        let base = (self.0 >> 45) as usize & 0x7fff;
-        Some(base + (COUNTS >> (2 * before) & 3))
+        Some(self.base() + (COUNTS >> (2 * before) & 3))
     }
 }
 

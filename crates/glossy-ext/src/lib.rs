@@ -17,8 +17,8 @@ pub use basis::Basis;
 pub use field::{GlossyField, Reflection};
 pub use hr_diffuse::{Rgb, hooks};
 pub use reflector::{
-    Compensated, Formula, Incident, Lambert, Lobe, MerlError, MetallicRoughness, Phong, Reflector, ReflectorError,
-    Sample, Sum, Tabulated, Ward,
+    Compensated, Contour, Formula, Incident, Lambert, Lobe, MerlError, MetallicRoughness, Phong, Reflector,
+    ReflectorError, Sample, Sum, Tabulated, Ward,
 };
 pub use samples::{IlluminationSample, Place, SampleSet, arriving};
 

@@ -2,8 +2,9 @@
 //! oriented point further down.
 
 use crate::Rgb;
-use crate::reflector::Incident;
+use crate::reflector::{Contour, Incident};
 use glam::{Mat3, Vec2, Vec3};
+use hr_diffuse::hooks::Sides;
 use hr_diffuse::{Hierarchy, NodeId, Transfer};
 
 /// Marks samples of receivers that are oriented: their irradiance includes the cosine.
@@ -195,7 +196,18 @@ fn together(samples: &[Incident]) -> Incident {
         direction: mean.normalize_or(Vec3::Z),
         extent: (extent2 + spread).sqrt().min(std::f32::consts::FRAC_PI_2),
         irradiance: samples.iter().map(|s| s.irradiance).sum(),
+        contour: Contour::NONE,
     }
+}
+
+/// The outline of a sender as it is seen from a place, in its frame.
+fn contour<H: Hierarchy>(hierarchy: &H, sender: NodeId, place: &Place) -> Contour {
+    let Some(Sides { across, along, taper }) = hierarchy.sides(sender) else { return Contour::NONE };
+    let to = hierarchy.center(sender) - place.at;
+    let distance2 = to.length_squared();
+    // Only what is perpendicular to the direction is seen.
+    let seen = |side: Vec3| place.local(side - to * (side.dot(to) / distance2)) / distance2.sqrt();
+    Contour::new(seen(across), seen(along), taper)
 }
 
 /// A sample received at `from` as it arrives at `place`; none below the horizon.
@@ -227,6 +239,7 @@ fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Plac
         direction: local,
         extent,
         irradiance: sample.irradiance() * scale,
+        contour: if extent > 0.0 { contour(hierarchy, sender, place) } else { Contour::NONE },
     })
 }
 
@@ -245,7 +258,8 @@ mod tests {
         let part = |i: usize| {
             let [x, y] = [i % n, i / n].map(|k| 0.36 * ((k as f32 + 0.5) / n as f32 - 0.5));
             let direction = Vec3::new(0.5 + x, y, 0.8).normalize();
-            Incident { direction, extent: 0.0, irradiance: Rgb::new(1.0, 0.5, 0.2) / (n * n) as f32 }
+            let irradiance = Rgb::new(1.0, 0.5, 0.2) / (n * n) as f32;
+            Incident { direction, irradiance, ..Incident::default() }
         };
         (0..n * n).map(part).collect()
     }

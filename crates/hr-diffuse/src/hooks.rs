@@ -89,6 +89,11 @@ pub trait Hierarchy: Sync {
         let distance = to.length().max(f32::MIN_POSITIVE);
         (to / distance, (self.radius(sender) / distance).min(1.0).asin())
     }
+    /// The outline of a sender that is a polygon, about its [`center`](Self::center); `None` for all others, which then count
+    /// as disks.
+    fn sides(&self, _sender: NodeId) -> Option<Sides> {
+        None
+    }
     /// Whether a sender is infinitely far: its direction is the same from everywhere.
     fn is_distant(&self, _sender: NodeId) -> bool {
         false
@@ -96,6 +101,27 @@ pub trait Hierarchy: Sync {
     /// Whether the node is a part of one plane, so that all of it is oriented alike.
     fn is_flat(&self, node: NodeId) -> bool {
         self.material(node).is_some() && self.normals(node).cos_angle > FLAT_COSINE
+    }
+}
+
+/// Outline of a flat sender: a trapezoid, the points centre + s (1 − taper t) across + (t + taper/3) along for −1 ≤ s, t ≤ 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sides {
+    /// Half of the mean width.
+    pub across: Vec3,
+    /// Half of the height.
+    pub along: Vec3,
+    /// 0 for a parallelogram, 1 for a triangle.
+    pub taper: f32,
+}
+
+impl Sides {
+    /// Distance from the centre to the farthest corner.
+    #[must_use]
+    pub fn reach(&self) -> f32 {
+        let Self { across, along, taper } = *self;
+        let corner = |s: f32, t: f32| (across * (s * (1.0 - taper * t)) + along * (t + taper / 3.0)).length();
+        [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)].into_iter().fold(0.0, f32::max)
     }
 }
 

@@ -49,6 +49,7 @@ mod sealed;
 mod segments;
 mod shadows;
 mod shooting;
+mod sides;
 mod skips;
 pub mod solution;
 pub mod solver;

@@ -8,6 +8,7 @@ use crate::glossy::Mode;
 use crate::html;
 use crate::interrupt::{Interrupt, STOPPING};
 use crate::loading::{is_dark, load};
+use crate::metering;
 use crate::progress::Progress;
 use crate::raycast::RayCaster;
 use crate::session;
@@ -28,9 +29,8 @@ const FRAMES: usize = 60;
 const FRAME_SIZE: [u32; 2] = [640, 400];
 /// Rays per pixel of frames, squared.
 const FRAME_GRID: u32 = 2;
-/// Frames share one exposure: that of so many small pictures along the way, this wide and high.
+/// Frames share one exposure: that of so many places along the way.
 const METERED: usize = 12;
-const METER_SIZE: [u32; 2] = [64, 40];
 
 /// Where frames go when there is no window and nobody said where.
 const FALLBACK_FRAMES: &str = "hr-view-frames";
@@ -200,7 +200,7 @@ impl Show<'_> {
         let scene = &self.solved.scene;
         let watch = |share| self.progress.at("taking the picture", share);
         let image = self.caster().render(&scene.default_camera(), &watch);
-        self.warn_if_black(&image.pixels);
+        self.warn_if_black(image.pixels.iter().all(|pixel| *pixel == Rgb::ZERO));
         image.save(path, &ToneMap::default(), scene.primaries)?;
         self.write_stats()
     }
@@ -226,15 +226,10 @@ impl Show<'_> {
             [camera.width, camera.height] = size;
             camera
         };
-        let meter = self.caster().with_grid(1);
         let walk = |count| if path.is_empty() { scene.walkthrough(count) } else { path.cameras(count) };
-        let metered: Vec<Rgb> = walk(METERED)
-            .into_iter()
-            .flat_map(|camera| meter.render(&resized(camera, METER_SIZE), &|_| ()).pixels)
-            .collect();
-        self.warn_if_black(&metered);
-        let exposure = Exposure::Factor(ToneMap::default().factor(&metered, scene.primaries));
-        let tone_map = ToneMap { exposure, ..ToneMap::default() };
+        let exposure = metering::exposure(self.solved, self.mode, &walk(METERED));
+        self.warn_if_black(exposure.is_none());
+        let tone_map = ToneMap { exposure: Exposure::Factor(exposure.unwrap_or(1.0)), ..ToneMap::default() };
         for (number, camera) in walk(FRAMES).into_iter().enumerate() {
             let watch = |share| self.progress.at("writing frames", (number as f32 + share) / FRAMES as f32);
             let camera =
@@ -247,8 +242,8 @@ impl Show<'_> {
     }
 
     /// Where nothing shines at all, that has been said.
-    fn warn_if_black(&self, pixels: &[Rgb]) {
-        if pixels.iter().all(|pixel| *pixel == Rgb::ZERO) && !is_dark(&self.solved.scene) {
+    fn warn_if_black(&self, is_black: bool) {
+        if is_black && !is_dark(&self.solved.scene) {
             self.progress.say(
                 "warning: all is black: nothing that is lit is in view; give --camera a view of it, and see whether lamps are \
                  enclosed or surfaces face away",

@@ -78,7 +78,7 @@ pub struct Args {
     #[arg(long, value_name = "OUT.html", conflicts_with_all = ["image", "frames"])]
     pub html: Option<PathBuf>,
 
-    /// No window: the solution for other programs; .csv is a table of elements, .glb a glTF model with the light in it
+    /// No window: the solution for other programs; .csv is a table of elements, .glb a glTF model with the light in it, .exr its lightmap
     #[arg(long, value_name = "FILE", conflicts_with_all = ["image", "frames", "html", "camera", "mode"])]
     pub export: Option<PathBuf>,
 }

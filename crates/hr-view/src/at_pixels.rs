@@ -11,6 +11,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
 use glossy_ext::{Formula, IlluminationSample, Reflector, Rgb};
 use hr_diffuse::facing::Facing;
+use hr_diffuse::hooks::Sides;
 use hr_diffuse::{Hierarchy, NodeId, Solution};
 use std::collections::HashMap;
 use std::f32::consts::{FRAC_1_PI, TAU};
@@ -18,8 +19,8 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 /// What tells whether a lobe is narrow: its width toward this direction.
 const ASLANT: Vec3 = Vec3::new(0.6, 0.0, 0.8);
 
-/// In narrow lobes one sees that senders, which lie side by side, count as disks. So much wider they close the gaps between
-/// them: where they are equal each direction is in two of them on average.
+/// In narrow lobes one sees that senders without a known outline, which lie side by side, count as disks. So much wider they
+/// close the gaps between them: where they are equal each direction is in two of them on average.
 const OVERLAP: f32 = 1.5;
 
 /// Flag of [`Leaf::material`]: the base colour is that of vertices and texture.
@@ -53,7 +54,7 @@ pub struct Run {
     pub end: u32,
 }
 
-/// An illumination sample with its sender and the place where it was received (80 bytes). Lengths are in scene units.
+/// An illumination sample with its sender and the place where it was received (112 bytes). Lengths are in scene units.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Arrival {
@@ -73,6 +74,14 @@ pub struct Arrival {
     pub irradiance: [f32; 3],
     /// Moments of the sender's normals ([`hr_diffuse::facing::Facing`]): mean, squares, mixed products.
     pub facing: [f32; 9],
+    /// Half of the mean width of a sender that is a polygon ([`hr_diffuse::hooks::Sides`]); 0 where it is none …
+    pub across: [f32; 3],
+    /// … how much it tapers …
+    pub taper: f32,
+    /// … and half of its height.
+    pub along: [f32; 3],
+    /// Makes the size one of a device's vectors.
+    pub unused: f32,
 }
 
 /// Some leaves with all that lights them.
@@ -244,6 +253,8 @@ fn arrival(solved: &Solved, origin: DVec3, receiver: NodeId, sample: &Illuminati
     let shines = element.is_patch() && solved.scene.materials[element.material as usize].exitance != Rgb::ZERO;
     let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
     let Facing { mean, diagonal, mixed } = element.facing;
+    let sides = solved.solution.light().sides(sender);
+    let Sides { across, along, taper } = sides.unwrap_or(Sides { across: Vec3::ZERO, along: Vec3::ZERO, taper: 0.0 });
     Arrival {
         center: center.to_array(),
         kind: flag(is_distant, DISTANT) | flag(sample.is_oriented(), ORIENTED) | flag(shines, SHINES),
@@ -253,6 +264,10 @@ fn arrival(solved: &Solved, origin: DVec3, receiver: NodeId, sample: &Illuminati
         cosine: direction.dot(normal),
         irradiance: sample.irradiance().to_array(),
         facing: bytemuck::cast([mean, diagonal, mixed]),
+        across: (across * unit).to_array(),
+        taper,
+        along: (along * unit).to_array(),
+        unused: 0.0,
     }
 }
 

@@ -188,6 +188,12 @@ pub trait Walkable: Send + Sync {
         up_of(self.cameras())
     }
 
+    /// What radiance is to be multiplied by in a picture that a camera takes, by what it sees; `None` where that is not known, or
+    /// nothing that it sees is lit. Called whenever the eye jumps, so it must not take long.
+    fn exposure(&self, _camera: &Camera) -> Option<f32> {
+        None
+    }
+
     /// Whether glossy light is to be shown as it is at pixels, where that can be.
     fn prefers_pixels(&self) -> bool {
         false

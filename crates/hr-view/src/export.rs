@@ -25,10 +25,13 @@
 //!
 //! Scene 1, `lightmap`, has the surfaces as they came, round ones cut into few triangles, and the light in **images** on
 //! their second set of texture coordinates, `TEXCOORD_1`: the base colour texture is radiance × `extras.exposure` of the
-//! material; `extras.irradiance` names a second texture with the irradiance, and how many W/m² its white stands for. Both
-//! are sRGB-encoded. Each side of each surface has a rectangle of its own, whose border is in the middle of its outermost
+//! material, in 8 bits that are dithered, so that gradients have no steps; `extras.irradiance` names a second texture with the
+//! irradiance, in 16 bits, and how many W/m² its white stands for. Both are sRGB-encoded. Each side of each surface has a rectangle of its own, whose border is in the middle of its outermost
 //! texels, so that surfaces that share an edge of the same length have the same texels on it; what lies around is a copy of
 //! the border, for filters. Sides that reflect and emit nothing are left out.
+//!
+//! # `.exr`: the lightmap as it is
+//! The first of these images, texel by texel, as linear radiance in W/(m² sr), neither exposed nor clamped, in the scene's primaries.
 
 mod glb;
 mod harmonics;
@@ -39,11 +42,14 @@ mod vertex_light;
 use crate::ViewError;
 use crate::display::up_of;
 use crate::facets::{Facets, Roundness, facets};
+use crate::glossy::Mode;
+use crate::metering;
 use crate::solved::Solved;
 use crate::window::Tone;
 use glam::{DMat4, DQuat, DVec3};
 use glb::Glb;
 use hr_diffuse::Rgb;
+use hr_scene::ToneMap;
 use hr_scene::whole_file::write_whole;
 use std::f32::consts::FRAC_1_PI;
 use std::path::Path;
@@ -55,6 +61,8 @@ pub enum Format {
     Csv,
     /// Binary glTF.
     Glb,
+    /// OpenEXR.
+    Exr,
 }
 
 impl Format {
@@ -66,8 +74,9 @@ impl Format {
         match path.extension().unwrap_or_default().to_ascii_lowercase().to_str() {
             Some("csv") => Ok(Self::Csv),
             Some("glb") => Ok(Self::Glb),
+            Some("exr") => Ok(Self::Exr),
             _ => Err(ViewError::Arguments(format!(
-                "--export {}: unknown format; end the name with .csv or .glb",
+                "--export {}: unknown format; end the name with .csv, .glb or .exr",
                 path.display()
             ))),
         }
@@ -81,6 +90,7 @@ impl Format {
 pub fn write(solved: &Solved, path: &Path) -> Result<(), ViewError> {
     match Format::of(path)? {
         Format::Csv => Ok(write_whole(path, |out| table::write(solved, out))?),
+        Format::Exr => Ok(lightmap::image(solved).save(path, &ToneMap::default(), solved.scene.primaries)?),
         Format::Glb => {
             let file = gltf(solved);
             Ok(write_whole(path, |out| file.write(out))?)
@@ -91,7 +101,9 @@ pub fn write(solved: &Solved, path: &Path) -> Result<(), ViewError> {
 /// Both scenes.
 fn gltf(solved: &Solved) -> Glb {
     let Facets { mesh, sources, .. } = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
-    let tone = Tone::for_mesh(&mesh);
+    let of_mesh = Tone::for_mesh(&mesh);
+    let metered = metering::exposure(solved, Mode::Distributions, &[solved.scene.default_camera()]);
+    let tone = Tone { exposure: metered.unwrap_or(of_mesh.exposure), ..of_mesh };
     let mut file = Glb::default();
     let place = place(solved, mesh.origin);
     let at_vertices = vertex_light::add(&mut file, solved, &mesh, &sources, &tone);

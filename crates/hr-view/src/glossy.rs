@@ -112,9 +112,9 @@ pub fn reflected<B: Basis>(
     narrowest: f32,
     scratch: &mut Vec<Incident>,
 ) -> Rgb {
-    arriving(&solution.elements, leaf, &solution.incident_path(leaf), place, scratch);
+    arriving(&solution.light(), leaf, &solution.incident_path(leaf), place, scratch);
     for sample in scratch.iter_mut() {
-        sample.extent = sample.extent.max(narrowest);
+        sample.widen(narrowest);
     }
     let light = reflector.reflect_sum(scratch, place.local(away));
     if light.is_finite() { light } else { Rgb::ZERO }

@@ -30,6 +30,8 @@ mod vertices;
 use crate::ViewError;
 use crate::display::{DisplayMesh, up_of};
 use crate::facets::{Facets, Roundness, Source, facets};
+use crate::glossy::Mode;
+use crate::metering;
 use crate::solved::Solved;
 use crate::window::lists::split;
 use crate::window::tone::BRIGHTEST;
@@ -54,6 +56,8 @@ const ROUNDNESS: Roundness = Roundness { fine: 0.25, flat_enough: 3e-4, coarse: 
 struct Facts<'a> {
     name: &'a str,
     cameras: &'a [(String, Camera)],
+    /// What each of them needs beside the first one's exposure.
+    exposures: Vec<f32>,
     up: [f64; 3],
     origin: [f64; 3],
     lattice: Lattice,
@@ -105,7 +109,11 @@ fn page(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut impl 
 
 /// Header and sections.
 fn solution(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut impl Write) -> io::Result<()> {
-    let tone = Tone::for_mesh(mesh);
+    let cameras = &solved.scene.cameras;
+    let of_mesh = Tone::for_mesh(mesh);
+    let metered = |camera: &Camera| metering::exposure(solved, Mode::Distributions, &[*camera]);
+    let exposures: Vec<_> = cameras.iter().map(|(_, camera)| metered(camera).unwrap_or(of_mesh.exposure)).collect();
+    let tone = Tone { exposure: exposures.first().copied().unwrap_or(of_mesh.exposure), ..of_mesh };
     let Curve { numerator: [a, b], denominator: [c, d, e] } = tone.curve;
     let lists = split(mesh, &[]);
     let lattice = Lattice::of(mesh);
@@ -116,7 +124,8 @@ fn solution(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut i
     let textures = mesh.textures.iter().enumerate().map(|(i, texture)| images::add(&mut payload, i, texture));
     let facts = Facts {
         name: &solved.scene.name,
-        cameras: &solved.scene.cameras,
+        cameras,
+        exposures: exposures.iter().map(|exposure| exposure / tone.exposure).collect(),
         up: up_of(&solved.scene.cameras).to_array(),
         origin: mesh.origin.to_array(),
         lattice,

@@ -172,8 +172,8 @@ impl Anatomy<'_> {
                 .into_iter()
                 .map(|(sender, _, irradiance)| Incident {
                     direction: place.local(light.direction_to(at, sender)),
-                    extent: 0.0,
                     irradiance,
+                    ..Incident::default()
                 })
                 .collect();
         }

@@ -14,6 +14,7 @@ pub mod html;
 pub mod inside;
 pub mod interrupt;
 mod loading;
+pub mod metering;
 pub mod path_tracer;
 pub mod progress;
 pub mod raycast;

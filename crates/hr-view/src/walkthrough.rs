@@ -6,6 +6,7 @@ use crate::display::{DisplayMesh, Walkable};
 use crate::facets::{Facets, Roundness, Source, facets};
 use crate::glossy::{self, Mode, NARROWEST};
 use crate::inside::{Anatomy, Inside};
+use crate::metering;
 use crate::solved::Solved;
 use glam::{DVec3, Vec3};
 use glossy_ext::{Incident, Place};
@@ -125,6 +126,10 @@ impl Walkable for Walkthrough {
 
     fn inside(&self) -> Option<Box<dyn Inside + '_>> {
         Some(Box::new(Anatomy { solved: &self.solved, origin: self.mesh.origin }))
+    }
+
+    fn exposure(&self, camera: &Camera) -> Option<f32> {
+        metering::exposure(&self.solved, self.mode, &[*camera])
     }
 
     fn prefers_pixels(&self) -> bool {

@@ -104,6 +104,9 @@ impl Walkable for Frozen<'_> {
     fn cameras(&self) -> &[(String, Camera)] {
         self.0.cameras()
     }
+    fn exposure(&self, camera: &Camera) -> Option<f32> {
+        self.0.exposure(camera)
+    }
     fn glossy_radiance(&self, _: DVec3, vertices: &[u32], out: &mut [Rgb]) {
         self.0.glossy_radiance(self.1, vertices, out);
     }
@@ -190,9 +193,9 @@ fn the_page_shows_what_the_window_shows() {
     eprintln!("ready in {} s; {} frames a second at 1280 × 720", said["seconds"], said["rate"]);
 
     let walkthrough = Walkthrough::new(Arc::clone(&solved), Mode::Distributions);
-    let tone = Tone::for_mesh(walkthrough.mesh());
     for (camera, name) in [(&first, "still"), (&second, "second")] {
         let shown = folder.picture(said[name].as_str().expect("a name"));
+        let tone = Tone::for_view(&walkthrough, camera);
         let cast = RayCaster::new(&solved.scene, &solved.solution, Mode::Distributions).render(camera, &|_| ());
         let code = |radiance: &Rgb| tone.apply(*radiance).to_array().map(|c| (255.0 * c).round() as u8);
         let cast: Vec<[u8; 3]> = cast.pixels.iter().map(code).collect();

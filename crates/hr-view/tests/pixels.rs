@@ -138,3 +138,19 @@ fn pixels_agree_with_the_ray_caster() {
         }
     }
 }
+
+/// Rays that follow narrow lobes show the lamp as it is; pixels that reflect samples show it with its own outline, too.
+#[test]
+fn highlights_have_the_outline_of_their_lamp() {
+    let solved = solved(Scene::load("area-light").expect("built in"), 0.1);
+    let (_, camera) = &solved.scene.cameras[0];
+    // The highlight, close up.
+    let camera = Camera { target: [0.0, -0.4, 0.0], fov_x: 22.0, width: 96, height: 72, ..*camera };
+    let truth = Truth::new(&solved, &camera);
+    let tone = truth.tone();
+    let walk = Walkthrough::new(Arc::clone(&solved), Mode::Samples);
+    let Some(picture) = draw(&walk, &camera, &tone) else { return };
+    let off = truth.difference(&picture, &tone);
+    // Were the lamp's parts disks, 13 % would be off.
+    assert!(off < 0.06, "{off} of the light");
+}

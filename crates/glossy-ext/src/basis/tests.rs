@@ -137,6 +137,7 @@ fn reflected_samples_are_represented<B: Case>() {
         direction: Vec3::new(x, y, (1.0 - x * x - y * y).sqrt()),
         extent: 0.1,
         irradiance,
+        ..Incident::default()
     };
     let incident = [from(0.5, 0.1, Rgb::X), from(-0.3, 0.6, Rgb::new(0.2, 1.0, 3.0)), from(0.1, -0.2, Rgb::ONE)];
     let support = Some(Support { cone: Cone { axis: Vec3::Z, cos_angle: 1e-3 }, beyond: Beyond::Continued });

@@ -55,7 +55,8 @@ impl Haar {
         restored.collect()
     }
 
-    /// Whether every index is within what it points into, and nodes are a forest no deeper than it may be.
+    /// Whether every index is within what it points into, and nodes are a forest no deeper than it may be: level by level, each
+    /// node's children after those of the one before it, as they are made.
     fn is_sound(&self) -> bool {
         if self.vertices.is_empty() {
             return self.nodes.is_empty() && self.roots == 0;
@@ -65,23 +66,46 @@ impl Haar {
         if !counts || !(0.0..=MOST_SCALE).contains(&self.scale) {
             return false;
         }
-        const UNMET: u8 = u8::MAX;
-        let mut levels = vec![UNMET; self.nodes.len()];
-        levels[..roots].fill(0);
-        self.nodes.iter().enumerate().all(|(index, node)| {
-            let level = levels[index];
-            let mids = node.mids();
-            let are_vertices = mids.iter().all(|&m| m == Node::NO_VERTEX || usize::from(m) < self.vertices.len());
-            let mut follow = || {
-                (0..4).filter_map(|child| node.child(child)).all(|child| {
-                    let is_new = child > index && levels.get(child) == Some(&UNMET);
-                    if is_new {
-                        levels[child] = level + 1;
-                    }
-                    is_new
-                })
-            };
-            level <= MAX_LEVEL && are_vertices && (node.is_childless() || node.is_divided() && follow())
-        })
+        let vertices = self.vertices.len() as u16;
+        // Where the next node's children begin, and where the level ends.
+        let (mut next, mut level, mut end) = (roots, 0, roots);
+        let are_sound = self.nodes.iter().enumerate().all(|(index, node)| {
+            if index == end {
+                (level, end) = (level + 1, next);
+            }
+            let follow = node.is_childless() || node.is_divided() && node.base() == next;
+            next += node.children();
+            let are_vertices = node.mids().into_iter().all(|m| m == Node::NO_VERTEX || m < vertices);
+            index < end && level <= MAX_LEVEL && are_vertices && follow
+        });
+        are_sound && next == self.nodes.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::haar::{Known, Refinement};
+    use glam::Vec3;
+
+    #[test]
+    fn nodes_in_another_order_are_refused() {
+        let axis = Vec3::new(0.3, -0.2, 0.9).normalize();
+        let lobe = |d: Vec3| Vec3::splat(d.dot(axis).max(0.0).powi(60));
+        let haar = Haar::project(&Refinement::default(), &Known::NOTHING, lobe).distribution;
+        assert!(haar.nodes.len() > 50 && haar.is_sound(), "what was made is sound: {} nodes", haar.nodes.len());
+        let changed = |change: &dyn Fn(&mut Vec<Node>)| {
+            let mut nodes = haar.nodes.to_vec();
+            change(&mut nodes);
+            Haar { nodes: nodes.into(), ..haar.clone() }.is_sound()
+        };
+        let parent = haar.nodes.iter().position(|node| !node.is_childless()).expect("a tree");
+        let [mids, base] = [0_u32, 45].map(|shift| 1_u64 << shift);
+        assert!(!changed(&|nodes| nodes[parent].0 += base), "children further on");
+        assert!(!changed(&|nodes| nodes[parent].0 -= base), "children of another");
+        assert!(!changed(&|nodes| nodes[parent].0 ^= 1 << 60), "a child more or less");
+        assert!(!changed(&|nodes| nodes[parent].0 |= 0x7ffe * mids), "a vertex that is none");
+        assert!(!changed(&|nodes| nodes.truncate(haar.nodes.len() - 1)), "the last one is missing");
+        assert!(!changed(&|nodes| nodes.push(Node::new([Node::NO_VERTEX; 3], 0, 0))), "one that nobody has");
     }
 }

@@ -8,7 +8,8 @@
 //! lobes that are much narrower. The smooth factor, the cosine and J are taken where the lobe and the disk meet: at the
 //! mean of the product of two Gaussians in their place ([`Meeting`]).
 
-use super::HORIZON;
+use super::contour::Trapezoid;
+use super::{Contour, HORIZON};
 use glam::{Vec2, Vec3};
 
 /// The visible part of a sender.
@@ -62,6 +63,8 @@ impl Disk {
 #[derive(Clone, Copy, Debug)]
 struct Slopes {
     incident: Vec3,
+    /// incident + outgoing.
+    half: Vec3,
     inv_z: f32,
     /// Slopes are multiplied by this, to make the lobe round.
     stretch: Vec2,
@@ -89,6 +92,7 @@ impl Slopes {
         let scale = inv_z * inv_z;
         Self {
             incident,
+            half: h,
             inv_z,
             stretch,
             slope: Vec2::new(x, y),
@@ -163,15 +167,42 @@ impl Meeting {
                 middle = slopes.slope * stretch + slopes.slope_of(disk.middle - incident);
             }
         }
+        Self::at(slopes, middle, disk)
+    }
+
+    fn at(slopes: Slopes, middle: Vec2, disk: &Disk) -> Self {
         Self {
             incident: slopes.incident,
-            h: slopes.incident + outgoing,
+            h: slopes.half,
             tan2: slopes.slope.length_squared(),
             weight: slopes.incident.z / disk.mean_cos,
             radius2: disk.radius2,
             slopes,
             middle,
         }
+    }
+
+    /// The same for a sender with a contour, all of which is above the horizon; and what the contour is in the plane of
+    /// stretched slopes, by the linear map at the meeting.
+    #[inline]
+    pub(super) fn within(
+        (disk, contour): (&Disk, &Contour),
+        outgoing: Vec3,
+        stretch: Vec2,
+        variance: impl Fn(f32) -> f32,
+    ) -> (Self, Trapezoid) {
+        let mut slopes = Slopes::new(disk.middle, outgoing, stretch);
+        let mut middle = slopes.slope * stretch;
+        let mut outline = contour.mapped(middle, |side| slopes.slope_of(side));
+        let step = outline.toward_lobe(variance(middle.length_squared()));
+        let moved = contour.point(disk.middle, step);
+        let incident = moved / moved.length();
+        if incident.z > HORIZON {
+            slopes = Slopes::new(incident, outgoing, stretch);
+            middle = slopes.slope * stretch + slopes.slope_of(disk.middle - incident);
+            outline = contour.mapped(middle, |side| slopes.slope_of(side));
+        }
+        (Self::at(slopes, middle, disk), outline)
     }
 
     /// For M = `lobe`·I + `share`·E: √det M, and √det M × sᵀM⁻¹s with the stretched slope s of the disk's middle.

@@ -5,7 +5,7 @@ use super::extent::{Disk, Meeting, ggx_over_disk};
 use super::ggx::{density, distribution, draw, mean_albedo, schlick, visibility};
 use super::half_vector::HalfRange;
 use super::ward::slope_to_width;
-use super::{Compensated, Formula, Incident, Lobe, Reflector, Sample, above, cosine_hemisphere, mirrored};
+use super::{Compensated, Contour, Formula, Incident, Lobe, Reflector, Sample, above, cosine_hemisphere, mirrored};
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
 use std::f32::consts::FRAC_1_PI;
@@ -105,10 +105,31 @@ impl MetallicRoughness {
         // Far out the density changes slowly, and the ellipse's shape matters less.
         let (_, squared) = meeting.rounded(alpha2 + meeting.tan2, 1.0);
         let density = ggx_over_disk(squared / alpha2, (root - alpha2) / alpha2) * (FRAC_1_PI / alpha2);
+        (self.at_meeting(&meeting, density, outgoing), schlick(meeting.h), schlick(disk.middle + outgoing))
+    }
+
+    /// The same averaged over a contour, where it has one that shows.
+    #[inline]
+    fn lobe_over(&self, disk: &Disk, contour: &Contour, outgoing: Vec3) -> (f32, f32, f32) {
+        let alpha2 = self.alpha * self.alpha;
+        // Far out the density changes slowly.
+        let h = disk.middle + outgoing;
+        let width2 = alpha2 + (h.x * h.x + h.y * h.y) / (h.z * h.z);
+        if contour.reach() == 0.0 || !contour.shows(disk.middle, width2.sqrt()) {
+            return self.lobe_over_disk(disk, outgoing);
+        }
+        let variance = |tan2: f32| 0.25 * (alpha2 + tan2);
+        let (meeting, outline) = Meeting::within((disk, contour), outgoing, Vec2::ONE, variance);
+        let density = outline.scaled(self.alpha.recip()).ggx() * (FRAC_1_PI / alpha2);
+        (self.at_meeting(&meeting, density, outgoing), schlick(meeting.h), schlick(h))
+    }
+
+    /// The lobe where it meets a sender, over which its density of slopes is this.
+    #[inline]
+    fn at_meeting(&self, meeting: &Meeting, density: f32, outgoing: Vec3) -> f32 {
         // D is the density of slopes / cos⁴.
         let inv_cos2 = 1.0 + meeting.tan2;
-        let factor = meeting.weight * inv_cos2 * inv_cos2 * visibility(self.alpha, meeting.incident.z, outgoing.z);
-        (density * factor, schlick(meeting.h), schlick(disk.middle + outgoing))
+        density * meeting.weight * inv_cos2 * inv_cos2 * visibility(self.alpha, meeting.incident.z, outgoing.z)
     }
 
     /// The lobe and w toward a point.
@@ -172,7 +193,7 @@ impl Reflector for MetallicRoughness {
         let (mut head_on, mut grazing, mut matte) = (Rgb::ZERO, Rgb::ZERO, Rgb::ZERO);
         for sample in incident {
             if let Some(disk) = Disk::new(sample.direction, sample.extent) {
-                let (lobe, w, mean_w) = self.lobe_over_disk(&disk, outgoing);
+                let (lobe, w, mean_w) = self.lobe_over(&disk, &sample.contour, outgoing);
                 head_on += sample.irradiance * (lobe * (1.0 - w));
                 grazing += sample.irradiance * (lobe * w);
                 matte += sample.irradiance * (MEAN_W - mean_w);

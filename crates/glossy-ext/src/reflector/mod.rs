@@ -22,6 +22,7 @@
 //! [`GlossyField`](crate::GlossyField) clamps and counts what does not.
 
 mod compensated;
+mod contour;
 mod error;
 mod extent;
 mod formula;
@@ -39,6 +40,7 @@ mod tests;
 mod ward;
 
 pub use compensated::Compensated;
+pub use contour::Contour;
 pub use error::ReflectorError;
 pub use formula::{Formula, LOSSES};
 pub use lambert::Lambert;
@@ -91,8 +93,30 @@ pub struct Incident {
     /// Angular radius of the sender in radians, 0…π/2. For a sender of solid angle ω that is not a disk the radius of
     /// a disk with the same solid angle, √(ω/π), is right; that of a bounding sphere blurs more than it must.
     pub extent: f32,
+    /// Outline of the sender, where it is known to be none of a disk: built-in lobes are averaged over it.
+    pub contour: Contour,
     /// Irradiance on the surface (W/m²), the cosine included.
     pub irradiance: Rgb,
+}
+
+impl Incident {
+    /// Angular radius that holds all of the sender, in radians.
+    #[must_use]
+    pub fn reach(&self) -> f32 {
+        self.extent.max(self.contour.reach())
+    }
+
+    /// Makes the sender at least so wide (radians).
+    pub fn widen(&mut self, least: f32) {
+        self.extent = self.extent.max(least);
+        self.contour = self.contour.widened(least);
+    }
+
+    /// Lets the sender be a point.
+    pub fn shrink(&mut self) {
+        self.extent = 0.0;
+        self.contour = Contour::NONE;
+    }
 }
 
 /// A bidirectional reflectance distribution function (1/sr), isotropic about the normal or not.
@@ -141,7 +165,8 @@ pub trait Reflector: Debug + Send + Sync {
     }
 
     /// Radiance (W/(m² sr)) that the glossy part sends toward `outgoing` for many senders at once: the sum of
-    /// [`glossy_toward_extent`](Self::glossy_toward_extent) × irradiance. This is the hottest loop of reflecting
+    /// [`glossy_toward_extent`](Self::glossy_toward_extent) × irradiance, or of a mean over the sender's
+    /// [contour](Incident::contour) where an implementation knows one. This is the hottest loop of reflecting
     /// illumination samples; as one call it is dispatched once per outgoing direction, and implementations reject
     /// negligible samples (less than 10⁻⁵ of the lobe's peak) before any costly function.
     fn reflect_sum(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {

@@ -48,15 +48,16 @@ impl Phong {
         self.ks * ((self.n + 2.0) / TAU)
     }
 
-    /// cosⁿ averaged over a disk; `mirror` is the mirrored outgoing direction, above the horizon.
+    /// cosⁿ averaged over a sender; `mirror` is the mirrored outgoing direction, above the horizon.
     #[inline]
-    fn lobe_over_disk(&self, incident: Vec3, mirror: Vec3, extent: f32) -> f32 {
+    fn lobe_over(&self, sample: &Incident, mirror: Vec3) -> f32 {
+        let Incident { direction, extent, contour, .. } = sample;
         // Distances, not cosines, keep high exponents exact. cosⁿ ψ is below exp(−n ψ²/2).
-        let nearest = extent + self.cut;
-        if incident.distance_squared(mirror) > nearest * nearest {
+        let nearest = sample.reach() + self.cut;
+        if direction.distance_squared(mirror) > nearest * nearest {
             return 0.0;
         }
-        let Some(disk) = Disk::new(incident, extent) else { return 0.0 };
+        let Some(disk) = Disk::new(*direction, *extent) else { return 0.0 };
         let apart = mirror - disk.middle;
         let versine = 0.5 * apart.length_squared();
         if versine >= 1.0 {
@@ -65,6 +66,17 @@ impl Phong {
         let exponent = -self.n * (-versine).ln_1p();
         if disk.radius2 == 0.0 {
             return (-exponent).exp();
+        }
+        // In slopes of half vectors, which turn by half of what directions do, the lobe is half as wide.
+        if contour.shows(*direction, (0.5 / self.n).sqrt()) {
+            // The plane that touches the sphere in the mirror direction, in units that make the lobe exp(−|p|²).
+            let (x, y) = mirror.any_orthonormal_pair();
+            let flat = |v: Vec3| Vec2::new(x.dot(v), y.dot(v));
+            let unit = (0.5 * self.n).sqrt();
+            let outline =
+                contour.mapped(flat(*direction).normalize_or_zero() * exponent.sqrt(), |side| flat(side) * unit);
+            let met = contour.point(*direction, outline.toward_lobe(0.5));
+            return met.z / (met.length() * disk.mean_cos) * outline.gaussian();
         }
         // The cosine is taken where the lobe and the disk meet: both are like Gaussians, of variances 1/n and r²/4.
         let share = 0.25 * disk.radius2 * self.n;
@@ -135,7 +147,8 @@ impl Reflector for Phong {
 
     fn glossy_toward_extent(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> Rgb {
         if above(outgoing) {
-            self.scale() * self.lobe_over_disk(incident, mirrored(outgoing), extent)
+            let sender = Incident { direction: incident, extent, irradiance: Rgb::ONE, ..Incident::default() };
+            self.scale() * self.lobe_over(&sender, mirrored(outgoing))
         } else {
             Rgb::ZERO
         }
@@ -148,7 +161,7 @@ impl Reflector for Phong {
         let mirror = mirrored(outgoing);
         let mut sum = Rgb::ZERO;
         for sample in incident {
-            let lobe = self.lobe_over_disk(sample.direction, mirror, sample.extent);
+            let lobe = self.lobe_over(sample, mirror);
             if lobe > 0.0 {
                 sum += sample.irradiance * lobe;
             }

@@ -95,21 +95,27 @@ impl Ward {
         (-stretched / (self.alpha * self.alpha)).exp() * (1.0 + tan2) * inv
     }
 
-    /// The lobe averaged over a disk, without [`scale`](Self::scale); `outgoing` is above the horizon. Where the
+    /// The lobe averaged over a sender, without [`scale`](Self::scale); `outgoing` is above the horizon. Where the
     /// lobe is known to be `ROUND`, not stretching it costs nothing.
     #[inline]
-    fn lobe_over_disk<const ROUND: bool>(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> f32 {
+    fn lobe_over<const ROUND: bool>(&self, sample: &Incident, outgoing: Vec3) -> f32 {
+        let Incident { direction, extent, contour, .. } = sample;
         let stretch = if ROUND { Vec2::ONE } else { self.stretch };
         let alpha2 = self.alpha * self.alpha;
-        // No direction of the disk makes a half vector with a smaller slope than this.
-        let h = incident + outgoing;
-        let nearest = extent * stretch.max_element() + CUT * self.alpha * (h.z + extent);
+        // No direction of the sender makes a half vector with a smaller slope than this.
+        let (h, reach) = (*direction + outgoing, sample.reach());
+        let nearest = reach * stretch.max_element() + CUT * self.alpha * (h.z + reach);
         if (h.truncate() * stretch).length_squared() > nearest * nearest {
             return 0.0;
         }
-        let Some(disk) = Disk::new(incident, extent) else { return 0.0 };
+        let Some(disk) = Disk::new(*direction, *extent) else { return 0.0 };
         if disk.radius2 == 0.0 {
-            return self.lobe_toward(incident, outgoing);
+            return self.lobe_toward(*direction, outgoing);
+        }
+        if contour.shows(*direction, self.alpha / stretch.max_element()) {
+            let (meeting, outline) = Meeting::within((&disk, contour), outgoing, stretch, |_| 0.5 * alpha2);
+            let factor = meeting.weight * (1.0 + meeting.tan2) / (meeting.h.z * meeting.h.z);
+            return factor * outline.scaled(self.alpha.recip()).gaussian();
         }
         let meeting = Meeting::new(&disk, outgoing, stretch, |_| 0.5 * alpha2);
         // A disk of radius r has the variance r²/4 per axis, the lobe α²/2; where one is slender against the other,
@@ -125,7 +131,7 @@ impl Ward {
     fn sum<const ROUND: bool>(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
         let mut sum = Rgb::ZERO;
         for sample in incident {
-            let lobe = self.lobe_over_disk::<ROUND>(sample.direction, outgoing, sample.extent);
+            let lobe = self.lobe_over::<ROUND>(sample, outgoing);
             if lobe > 0.0 {
                 sum += sample.irradiance * lobe;
             }
@@ -195,7 +201,8 @@ impl Reflector for Ward {
     }
 
     fn glossy_toward_extent(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> Rgb {
-        self.reflect_sum(&[Incident { direction: incident, extent, irradiance: Rgb::ONE }], outgoing)
+        let sender = Incident { direction: incident, extent, irradiance: Rgb::ONE, ..Incident::default() };
+        self.reflect_sum(&[sender], outgoing)
     }
 
     fn reflect_sum(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {

@@ -41,19 +41,19 @@ struct Made {
     error: f64,
 }
 
-/// 3 × 7 lights of 4 cm, 1 m from the middle of a glossy reflector of 2 cm; those at its horizon are left out.
+/// 3 × 7 lights of 1 cm, so small that none is divided, 1 m from the middle of a glossy reflector of 2 cm; those at its horizon are left out.
 fn lights(angle: f64, alpha: f32) -> Result<(SceneInput, Vec<Arc<dyn Reflector>>), ReflectorError> {
     let reflectors: Vec<Arc<dyn Reflector>> =
         vec![Arc::new(Ward::new(Rgb::ZERO, Rgb::splat(0.9), alpha)?), Arc::new(Lambert::new(Rgb::ZERO)?)];
     let black = DiffuseMaterial { reflectance: Rgb::ZERO, exitance: Rgb::ZERO, two_sided: false };
-    let materials = vec![black, DiffuseMaterial { exitance: Rgb::splat(2e5), ..black }];
+    let materials = vec![black, DiffuseMaterial { exitance: Rgb::splat(3.2e6), ..black }];
     let mut surfaces = vec![patch(DVec3::ZERO, DVec3::Z, 0.02, 0)];
     for row in -1..=1 {
         for column in -3..=3 {
             let [x, y] = [column, row].map(|i| (f64::from(i) * angle).to_radians());
             let toward = dvec3(x.sin() * y.cos(), y.sin(), x.cos() * y.cos());
             if toward.z > 0.05 {
-                surfaces.push(patch(toward, -toward, 0.04, 1));
+                surfaces.push(patch(toward, -toward, 0.01, 1));
             }
         }
     }

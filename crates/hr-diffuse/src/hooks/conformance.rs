@@ -300,6 +300,15 @@ impl<L> Watched<L> {
             } else if apart && said.dot(expected) < 1.0 - COSINE {
                 self.report(Fault::Direction { receiver, sender, said, expected });
             }
+            if let Some(sides) = hierarchy.sides(sender) {
+                let is_trapezoid =
+                    sides.across.is_finite() && sides.along.is_finite() && (0.0..=1.0).contains(&sides.taper);
+                if !is_trapezoid || sides.reach() > hierarchy.radius(sender) * (1.0 + SLACK) {
+                    let what =
+                        "`sides` are not finite, reach beyond the radius, or taper by less than 0 or more than 1";
+                    self.report(Fault::Geometry { node: sender, what });
+                }
+            }
             if oriented != hierarchy.is_flat(receiver) {
                 self.report(Fault::Oriented { receiver, said: oriented });
             }

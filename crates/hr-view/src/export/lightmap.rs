@@ -5,10 +5,12 @@ use super::glb::Glb;
 use crate::solved::Solved;
 use crate::window::Tone;
 use glam::{DVec3, Vec2, Vec3};
+use hr_diffuse::sampling::{hash, unit};
 use hr_diffuse::{Domain, Geometry, Rgb};
+use hr_scene::Image;
 use hr_scene::tonemap::srgb_transfer;
-use image::ImageEncoder;
 use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
 use serde_json::json;
 
@@ -23,6 +25,8 @@ const MARGIN: u32 = 2;
 /// Round surfaces are cut until chords leave them by less than this share of the scene's size, or into so many.
 const ROUND: f32 = 3e-4;
 const MOST_CELLS: u32 = 64;
+/// Tells the numbers of one use of a hash from those of others.
+const DITHER: u32 = 0x51ed;
 /// So many of all texels may be brighter than white in the image of the irradiance.
 const BRIGHTER: f32 = 1e-3;
 
@@ -45,8 +49,8 @@ pub(super) fn add(file: &mut Glb, solved: &Solved, origin: DVec3, tone: &Tone) -
     let [radiance, irradiance] = bake(solved, &charts, size);
     let to_709 = |light: &Rgb| tone.to_srgb * *light;
     let white = white(&irradiance);
-    let shown = png(size, radiance.iter().map(|light| to_709(light) * tone.exposure));
-    let arriving = png(size, irradiance.iter().map(|light| to_709(light) / white));
+    let shown = png8(size, radiance.iter().map(|light| to_709(light) * tone.exposure));
+    let arriving = png16(size, irradiance.iter().map(|light| to_709(light) / white));
     let shown = file.texture("radiance", &shown);
     let arriving = file.texture("irradiance", &arriving);
     let extras = json!({
@@ -66,6 +70,14 @@ pub(super) fn add(file: &mut Glb, solved: &Solved, origin: DVec3, tone: &Tone) -
     let indices = file.indices(&mesh.indices);
     let primitive = json!({ "attributes": attributes, "indices": indices, "material": material });
     Some(file.mesh("lightmap", &[primitive], &json!({})))
+}
+
+/// The radiance of all texels as a picture, in the scene's primaries; one black pixel of a scene where nothing is shown.
+pub(super) fn image(solved: &Solved) -> Image {
+    let mut charts = charts(solved);
+    let Some([width, height]) = pack(&mut charts) else { return Image::new(1, 1) };
+    let [pixels, _] = bake(solved, &charts, [width, height]);
+    Image { width, height, pixels }
 }
 
 /// All sides that do anything with light, each surface once.
@@ -212,14 +224,35 @@ fn white(light: &[Rgb]) -> f32 {
     lit.get(at.min(lit.len().saturating_sub(1))).copied().unwrap_or(1.0)
 }
 
-/// A PNG file of linear colours, 8-bit sRGB.
-fn png([width, height]: [u32; 2], colors: impl Iterator<Item = Vec3>) -> Vec<u8> {
-    let code = |x: f32| (255.0 * srgb_transfer(f64::from(x.clamp(0.0, 1.0)))).round() as u8;
-    let bytes: Vec<u8> = colors.flat_map(|color| color.to_array().map(code)).collect();
+/// sRGB code of a linear value, 0…1.
+fn encoded(x: f32) -> f64 {
+    srgb_transfer(f64::from(x.clamp(0.0, 1.0)))
+}
+
+/// A PNG file of linear colours, 8-bit sRGB. Viewers show no more bits; so that slow gradients have no steps in them, what
+/// lies between two codes is rounded up as often as it is near the upper one.
+pub(super) fn png8(size: [u32; 2], colors: impl Iterator<Item = Vec3>) -> Vec<u8> {
+    let texels = (0..).zip(colors);
+    let codes = texels.flat_map(|(texel, color)| {
+        let chance = f64::from(unit(hash(texel, DITHER)));
+        // 255 and what rounding adds to it is 255.
+        color.to_array().map(|x| (255.0 * encoded(x) + chance).floor() as u8)
+    });
+    png(size, &codes.collect::<Vec<u8>>(), ExtendedColorType::Rgb8)
+}
+
+/// The same, 16-bit, for programs that compute with it.
+fn png16(size: [u32; 2], colors: impl Iterator<Item = Vec3>) -> Vec<u8> {
+    let codes = colors.flat_map(|color| color.to_array().map(|x| (65_535.0 * encoded(x)).round() as u16));
+    // The encoder takes the machine's byte order.
+    png(size, bytemuck::cast_slice(&codes.collect::<Vec<u16>>()), ExtendedColorType::Rgb16)
+}
+
+fn png([width, height]: [u32; 2], bytes: &[u8], kind: ExtendedColorType) -> Vec<u8> {
     let mut png = Vec::new();
     let encoder = PngEncoder::new(&mut png);
     // Into memory, with as many bytes as there are texels: nothing can fail.
-    let written = encoder.write_image(&bytes, width, height, image::ExtendedColorType::Rgb8);
+    let written = encoder.write_image(bytes, width, height, kind);
     debug_assert!(written.is_ok(), "a picture in memory: {written:?}");
     png
 }

@@ -4,6 +4,7 @@ use super::*;
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Settings, Shape, Surface};
 use hr_scene::Scene;
+use std::f32::consts::PI;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -101,7 +102,42 @@ fn both_scenes_are_valid_and_bright() {
         let mean =
             png.to_rgb8().pixels().map(|p| f64::from(p.0[1])).sum::<f64>() / f64::from(png.width() * png.height());
         assert!(mean > 5.0, "the {name} is dark: {mean}");
+        let kind = if name == "radiance" { image::ColorType::Rgb8 } else { image::ColorType::Rgb16 };
+        assert_eq!(png.color(), kind, "bits of the {name}");
     }
+}
+
+#[test]
+fn gradients_have_no_steps() {
+    // From one code to the next over 64 columns; the mean of each of four strips of them is between both codes.
+    let [low, high] = [100.0_f32, 101.0].map(|code| ((code / 255.0 + 0.055) / 1.055).powf(2.4));
+    let size = [64, 256];
+    let colors = (0..size[0] * size[1]).map(|i| Vec3::splat(low + (high - low) * (i % size[0]) as f32 / 63.0));
+    let png = image::load_from_memory(&lightmap::png8(size, colors)).expect("a picture").to_rgb8();
+    for strip in 0..4 {
+        let texels = png.enumerate_pixels().filter(|(x, ..)| x / 16 == strip);
+        let mean = texels.map(|(.., p)| f64::from(p.0[0])).sum::<f64>() / f64::from(16 * size[1]);
+        let right = 100.0 + (f64::from(strip) * 16.0 + 7.5) / 63.0;
+        // 4096 draws of 0 or 1: 0.008 of standard deviation; the transfer function bends by less.
+        assert!((mean - right).abs() < 0.03, "strip {strip}: {mean}, not {right}");
+    }
+    let ends = [0.0, 1.0]
+        .map(|x| image::load_from_memory(&lightmap::png8(size, std::iter::repeat_n(Vec3::splat(x), 64 * 256))));
+    for (end, code) in ends.into_iter().zip([0, 255]) {
+        assert!(end.expect("a picture").to_rgb8().iter().all(|&c| c == code), "{code} stays");
+    }
+}
+
+#[test]
+fn the_lightmap_is_written_as_it_is() {
+    let solved = solved("furnace");
+    let image = lightmap::image(&solved);
+    // The furnace: 4 W/m² everywhere, in the second channel.
+    let lit: Vec<f32> = image.pixels.iter().map(|light| light.y).filter(|light| *light > 0.0).collect();
+    assert!(lit.len() > 100 && lit.iter().all(|y| (y * PI / 4.0 - 1.0).abs() < 1e-2), "{} texels", lit.len());
+    let file = File::of(&solved, "lightmap.exr");
+    let bytes = std::fs::read(&file.0).expect("it was written");
+    assert_eq!(bytes[..4], [0x76, 0x2f, 0x31, 0x01], "an OpenEXR file");
 }
 
 #[test]

@@ -10,7 +10,7 @@ const KEYS = [
   ["wheel", "walking speed"],
   ["1 … 9, 0", "the scene's cameras"],
   ["+ −", "brighter, darker"],
-  ["backspace", "automatic exposure"],
+  ["backspace", "automatic exposure again"],
   ["T", "show or hide the line at the top"],
   ["H", "this help"],
 ];
@@ -53,6 +53,8 @@ class Viewer {
     this.walker = new Walker(facts, this.picture.diagonal);
     this.pointers = new Map();
     this.stops = 0;
+    // What the camera gone to last needs beside the first one's exposure, which is in the light already.
+    this.automatic = 1;
     this.frame = { asked: false, last: null, time: 0, evaluated: 0 };
     document.title = `${facts.name} — hr-view`;
     facts.cameras.forEach(([name], i) => {
@@ -193,6 +195,7 @@ class Viewer {
       return;
     }
     this.walker.take(camera[1], this.facts.origin);
+    this.automatic = this.facts.exposures[index];
     element("cameras").value = index;
     this.widen(this.walker.breadth);
   }
@@ -244,7 +247,7 @@ class Viewer {
       frame.time = now - frame.last;
       walker.advance(frame.time / 1000);
     }
-    const { evaluated, isMore } = this.picture.draw(walker, 2 ** this.stops);
+    const { evaluated, isMore } = this.picture.draw(walker, this.automatic * 2 ** this.stops);
     frame.evaluated = evaluated;
     this.tell();
     frame.last = walker.isMoving ? now : null;

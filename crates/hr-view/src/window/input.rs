@@ -45,7 +45,7 @@ pub(super) const HELP: [(&str, &str); 25] = [
     ("K", "glossy light at each pixel, or at vertices"),
     ("G", "false colours: radiance, radiosity, irradiance"),
     ("+ −", "brighter, darker"),
-    ("backspace", "automatic exposure"),
+    ("backspace", "expose for what is seen now"),
     ("F", "save a screenshot"),
     ("T", "show or hide the lines at the top"),
     ("H", "this help"),

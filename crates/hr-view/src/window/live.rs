@@ -19,6 +19,7 @@ use super::view::View;
 use super::walker::Walker;
 use super::{Blank, Walked, WindowError, WindowOptions, full, reason, unused};
 use crate::display::Walkable;
+use hr_scene::Camera;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
@@ -77,7 +78,10 @@ pub(super) struct Live {
     is_turned: Arc<AtomicBool>,
     /// Whether somebody has chosen himself where it is computed.
     has_chosen: bool,
+    /// For what was seen from where the eye last jumped to, or somebody asked for it; held while walking.
     automatic: Tone,
+    /// From there, unless that is the start.
+    metered: Option<Camera>,
     gauge: Gauge,
     looking: Looking,
     hud: Hud,
@@ -131,6 +135,7 @@ impl Live {
             wishes: options.wishes.clone(),
             tour: Tour::new(options.path.clone(), options.path_file.clone()),
             automatic: tone,
+            metered: None,
             gauge: Gauge::OFF,
             looking: Looking::default(),
             camera: None,
@@ -204,7 +209,7 @@ impl Live {
             }
             Err(error) => return Err(error),
         }
-        self.automatic = tone;
+        self.automatic = self.metered.as_ref().map_or(tone, |camera| Tone::for_view(walk.as_ref(), camera));
         self.walker.enter(walk.as_ref(), is_first);
         if is_first {
             self.settings.fov_x = self.walker.view.fov_x;
@@ -352,7 +357,10 @@ impl Live {
             Command::Leave if self.looking.leave() => self.look()?,
             Command::Leave => return Ok(Next::Quit),
             Command::Expose(more) => self.settings.stops = (stops + more).clamp(-30.0, 30.0),
-            Command::AutomaticExposure => self.settings.stops = 0.0,
+            Command::AutomaticExposure => {
+                self.settings.stops = 0.0;
+                self.meter();
+            }
             Command::Help => self.hud.show_help = !self.hud.show_help,
             Command::Lines => self.hud.show_lines = !self.hud.show_lines,
             Command::Screenshot => self.screenshot()?,
@@ -423,6 +431,7 @@ impl Live {
                 self.settings.fov_x = self.walker.view.fov_x;
                 self.camera = Some(index);
                 self.hud.say(format!("camera {}: {name}", index + 1));
+                self.meter();
             }
             None => {
                 let count = self.walk.cameras().len();
@@ -505,6 +514,13 @@ impl Live {
             self.window.set_cursor_visible(true);
         }
         self.mouse = wanted;
+    }
+
+    /// Exposes for what is seen now.
+    fn meter(&mut self) {
+        let camera = self.walker.view.camera(self.canvas.size());
+        self.automatic = Tone::for_view(self.walk.as_ref(), &camera);
+        self.metered = Some(camera);
     }
 
     fn tone(&self) -> Tone {

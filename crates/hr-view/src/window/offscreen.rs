@@ -55,7 +55,7 @@ impl<'a> Offscreen<'a> {
         let pass = Pass::new(&gpu, &layouts, snapshot::FORMAT, samples);
         let shown = Shown::new(&gpu, &layouts, walk, Parts::new(walk, gpu.capacity(), walk.prefers_pixels()))?;
         gpu.fault()?;
-        Ok(Self { walk, pass, shown, tone: Tone::for_mesh(mesh), size, target, gpu })
+        Ok(Self { walk, pass, shown, tone: Tone::for_start(walk), size, target, gpu })
     }
 
     /// The device that draws.

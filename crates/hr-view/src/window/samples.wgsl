@@ -1,6 +1,6 @@
 // Glossy light at the pixel: the illumination samples of a leaf and of all nodes above it, reflected by the material's
 // formula. What is computed is what glossy_ext does: `arrived` of its samples, `extent` and the reflectors of the same
-// names, where everything is explained; `scene.wgsl` comes before this.
+// names, `contour`, where everything is explained; `scene.wgsl` comes before this.
 
 const VARIES = 0x80000000u;
 const DISTANT = 1u;
@@ -14,6 +14,9 @@ const LOSSES = 33u;
 
 // Bits of the kinds of lobes that there are: the others cost nothing.
 override KINDS: u32 = 15u;
+
+// Whether senders that are polygons have their outline; without it all are disks.
+override OUTLINES: bool = true;
 
 struct Leaf {
     first: u32,
@@ -35,6 +38,10 @@ struct Arrival {
     squares_z: f32,
     mixed_x: f32,
     mixed_yz: vec2f,
+    across: vec3f,
+    taper: f32,
+    along: vec3f,
+    unused: f32,
 }
 
 @group(2) @binding(0) var<storage, read> leaves: array<Leaf>;
@@ -70,6 +77,23 @@ struct Incident {
     direction: vec3f,
     extent: f32,
     irradiance: vec3f,
+    contour: Contour,
+}
+
+// A sender's outline as it is seen.
+struct Contour {
+    across: vec3f,
+    along: vec3f,
+    taper: f32,
+    reach: f32,         // 0: there is none
+}
+
+// The same in the plane of slopes.
+struct Trapezoid {
+    middle: vec2f,
+    across: vec2f,
+    along: vec2f,
+    taper: f32,
 }
 
 // The visible part of a sender.
@@ -104,11 +128,30 @@ fn mean_cosine(a: Arrival, direction: vec3f) -> f32 {
     return max(max(min(series, 0.5 * (x + sqrt(x2))), x), 0.0);
 }
 
+// A contour of these half sides, at least so wide.
+fn contour_of(across: vec3f, along: vec3f, taper: f32, narrowest: f32) -> Contour {
+    let widest = 0.8;
+    let least = 0.8862269 * narrowest;
+    let lengths = vec2f(length(across), length(along));
+    let wider = max(vec2f(1.0), least / max(lengths, vec2f(1e-30)));
+    let sides = lengths * wider;
+    let wide = (1.0 + taper) * sides.x + (1.0 - taper / 3.0) * sides.y;
+    let narrow = (1.0 - taper) * sides.x + (1.0 + taper / 3.0) * sides.y;
+    let reach = max(wide, narrow);
+    return Contour(across * wider.x, along * wider.y, taper, select(0.0, reach, reach <= widest));
+}
+
+// Whether a lobe of half-vector slopes of this width shows that a sender about `middle` is no disk.
+fn shows(c: Contour, middle: vec3f, width: f32) -> bool {
+    return c.reach > 0.35 * width && c.reach > 0.0 && middle.z - c.reach > HORIZON;
+}
+
 // A sample as it arrives at a place; no irradiance below the horizon.
-fn arrived(a: Arrival, at: vec3f, frame_: mat3x3f) -> Incident {
+fn arrived(a: Arrival, at: vec3f, frame_: mat3x3f, narrowest: f32) -> Incident {
     var direction = a.center;
     var extent = 0.0;
     var renewal = 1.0;
+    var contour = Contour(vec3f(0.0), vec3f(0.0), 0.0, 0.0);
     if (a.kind & DISTANT) == 0u {
         let to = a.center - at;
         let d2 = max(dot(to, to), 1e-12 * a.spread);
@@ -116,6 +159,12 @@ fn arrived(a: Arrival, at: vec3f, frame_: mat3x3f) -> Incident {
         let share = min(a.area * mean_cosine(a, -direction), a.radius * a.radius) / d2;
         extent = asin(sqrt(min(share, 1.0)));
         renewal = a.spread / (d2 + a.radius * a.radius);
+        if OUTLINES && any(a.across != vec3f(0.0)) {
+            let unit = inverseSqrt(d2);
+            let across = (a.across - direction * dot(a.across, direction)) * unit;
+            let along = (a.along - direction * dot(a.along, direction)) * unit;
+            contour = contour_of(across * frame_, along * frame_, a.taper, narrowest);
+        }
     }
     let local = direction * frame_;
     let cosine = local.z;
@@ -127,7 +176,7 @@ fn arrived(a: Arrival, at: vec3f, frame_: mat3x3f) -> Incident {
         scale = clamp(renewal, 1.0 / MOST_RENEWAL, MOST_RENEWAL) * cosine;
     }
     let arrives = scale > 0.0 && (cosine > 0.0 || extent > 0.0);
-    return Incident(local, extent, select(vec3f(0.0), a.irradiance * scale, arrives));
+    return Incident(local, extent, select(vec3f(0.0), a.irradiance * scale, arrives), contour);
 }
 
 fn disk_of(direction: vec3f, extent: f32) -> Disk {
@@ -208,6 +257,142 @@ fn meeting_of(disk: Disk, outgoing: vec3f, stretch: vec2f, first: Slopes, varian
     return Meeting(slopes.incident, slopes.incident + outgoing, tan2, weight, slopes.square * disk.radius2, middle);
 }
 
+// J v.
+fn slope_of(s: Slopes, stretch: vec2f, v: vec3f) -> vec2f {
+    let across = v - s.incident * dot(s.incident, v);
+    return (across.xy - s.slope * across.z) * stretch * s.inv_z;
+}
+
+struct Within {
+    meeting: Meeting,
+    outline: Trapezoid,
+}
+
+// Where a lobe and a sender with a contour meet, and the contour's slopes there.
+fn within(disk: Disk, c: Contour, outgoing: vec3f, stretch: vec2f, first: Slopes, variance: f32) -> Within {
+    var slopes = first;
+    var middle = slopes.slope * stretch;
+    var outline =
+        Trapezoid(middle, slope_of(slopes, stretch, c.across), slope_of(slopes, stretch, c.along), c.taper);
+    let step = toward_lobe(outline, variance);
+    let incident = normalize(disk.middle + c.across * step.x + c.along * step.y);
+    if incident.z > HORIZON {
+        slopes = slopes_of(incident, outgoing, stretch);
+        middle = slopes.slope * stretch + slope_of(slopes, stretch, disk.middle - incident);
+        outline = Trapezoid(middle, slope_of(slopes, stretch, c.across), slope_of(slopes, stretch, c.along), c.taper);
+    }
+    let weight = slopes.incident.z / disk.mean_cos;
+    let tan2 = dot(slopes.slope, slopes.slope);
+    let met = Meeting(slopes.incident, slopes.incident + outgoing, tan2, weight, slopes.square, middle);
+    return Within(met, outline);
+}
+
+// Variances of s (1 − taper t) and t.
+fn variances(taper: f32) -> vec2f {
+    return vec2f((1.0 + taper * taper) / 3.0, 1.0 / 3.0 - taper * taper / 9.0);
+}
+
+// For M = lobe·I + share·covariance: det M, and (det M) M⁻¹ middle.
+fn outline_solved(o: Trapezoid, lobe: f32, share: f32) -> vec3f {
+    let v = share * variances(o.taper);
+    let xx = lobe + v.x * o.across.x * o.across.x + v.y * o.along.x * o.along.x;
+    let xy = v.x * o.across.x * o.across.y + v.y * o.along.x * o.along.y;
+    let yy = lobe + v.x * o.across.y * o.across.y + v.y * o.along.y * o.along.y;
+    let m = o.middle;
+    return vec3f(max(xx * yy - xy * xy, lobe * lobe), yy * m.x - xy * m.y, xx * m.y - xy * m.x);
+}
+
+fn toward_lobe(o: Trapezoid, variance: f32) -> vec2f {
+    let found = outline_solved(o, variance, 1.0);
+    let along = vec2f(dot(o.across, found.yz), dot(o.along, found.yz));
+    return clamp(-variances(o.taper) * along / found.x, vec2f(-1.0), vec2f(1.0));
+}
+
+fn scaled(o: Trapezoid, scale: f32) -> Trapezoid {
+    return Trapezoid(o.middle * scale, o.across * scale, o.along * scale, o.taper);
+}
+
+fn size2(o: Trapezoid) -> f32 {
+    let wide = 1.0 + o.taper;
+    return max(dot(o.across, o.across) * wide * wide, dot(o.along, o.along));
+}
+
+fn erf4(x: vec4f) -> vec4f {
+    let size = abs(x);
+    let t = 1.0 / (1.0 + 0.3275911 * size);
+    let series = t * (0.2548296 + t * (-0.28449672 + t * (1.4214138 + t * (-1.453152 + t * 1.0614054))));
+    return (1.0 - series * exp(-size * size)) * sign(x);
+}
+
+fn inverse_erf4(x: vec4f) -> vec4f {
+    let w = -log(max((1.0 - x) * (1.0 + x), vec4f(1e-7)));
+    let a = w - 2.5;
+    let near = 1.5014094 + a * (0.24664073 + a * (-4.1776816e-3 + a * (-1.253725e-3 + a * (2.1858087e-4
+        + a * (-4.3915065e-6 + a * (-3.5233877e-6 + a * (3.4327394e-7 + a * 2.8102264e-8)))))));
+    let b = sqrt(w) - 3.0;
+    let far = 2.8329768 + b * (1.001674 + b * (9.4388705e-3 + b * (-7.6224613e-3 + b * (5.7395077e-3
+        + b * (-3.6734284e-3 + b * (1.3493432e-3 + b * (1.0095056e-4 - b * 2.0021426e-4)))))));
+    return x * select(far, near, w < vec4f(5.0));
+}
+
+// Mean of exp(−|p|²) over a trapezoid.
+fn gaussian_over(o: Trapezoid) -> f32 {
+    if size2(o) < 0.2 {
+        let found = outline_solved(o, 1.0, 2.0);
+        return exp(-dot(o.middle, found.yz) / found.x) / sqrt(found.x);
+    }
+    let width = length(o.across);
+    let x_axis = o.across / width;
+    let y_axis = vec2f(-x_axis.y, x_axis.x);
+    let along = vec2f(dot(x_axis, o.along), dot(y_axis, o.along));
+    let base = vec2f(dot(x_axis, o.middle), dot(y_axis, o.middle)) + along * (o.taper / 3.0);
+    let height = abs(along.y);
+    var t = vec4f(-0.8611363, -0.339981, 0.339981, 0.8611363);
+    var weights = vec4f(0.3478548, 0.6521452, 0.6521452, 0.3478548);
+    if height < 0.7 {
+        let y = base.y + along.y * t;
+        weights *= exp(-y * y) / (4.0 * 1.1283792 * width);
+    } else {
+        let ends = erf4(vec4f(base.y - height, base.y + height, 0.0, 0.0)).xy;
+        let half_ = 0.5 * (ends.y - ends.x);
+        let y = inverse_erf4(0.5 * (ends.x + ends.y) + half_ * t);
+        t = clamp((y - base.y) / along.y, vec4f(-1.0), vec4f(1.0));
+        weights *= 0.25 * PI * half_ / (4.0 * width * height);
+    }
+    let x = base.x + along.x * t;
+    let half_width = width * (1.0 - o.taper * t);
+    return dot(weights, erf4(x + half_width) - erf4(x - half_width));
+}
+
+// Twice ∫ 1/(1 + |p|²)² over the triangle between the origin and an edge.
+fn ggx_edge(start: vec2f, end: vec2f) -> f32 {
+    let edge = end - start;
+    let long = max(length(edge), 1e-20);
+    let distance_ = (start.x * edge.y - start.y * edge.x) / long;
+    let from_ = dot(start, edge) / long;
+    let root2 = 1.0 + distance_ * distance_;
+    let root = sqrt(root2);
+    return distance_ / root * atan2(long * root, root2 + from_ * (from_ + long));
+}
+
+// Mean of 1/(1 + |p|²)² over a trapezoid.
+fn ggx_over(o: Trapezoid) -> f32 {
+    let fall = 1.0 / (1.0 + dot(o.middle, o.middle));
+    if size2(o) * fall < 0.03 {
+        let v = variances(o.taper);
+        let mixed = vec2f(dot(o.middle, o.across), dot(o.middle, o.along));
+        let squares = vec2f(dot(o.across, o.across), dot(o.along, o.along));
+        return fall * fall * (1.0 + 12.0 * fall * fall * dot(v, mixed * mixed) - 2.0 * fall * dot(v, squares));
+    }
+    let wide = o.across * (1.0 + o.taper);
+    let narrow = o.across * (1.0 - o.taper);
+    let low = o.middle + o.along * (o.taper / 3.0) - o.along;
+    let high = low + 2.0 * o.along;
+    let sum = ggx_edge(low - wide, low + wide) + ggx_edge(low + wide, high + narrow)
+        + ggx_edge(high + narrow, high - narrow) + ggx_edge(high - narrow, low - wide);
+    return 0.125 * abs(sum) / abs(o.across.x * o.along.y - o.across.y * o.along.x);
+}
+
 // For M = lobe·I + share·E: √det M, and √det M × sᵀM⁻¹s.
 fn rounded(m: Meeting, lobe: f32, share: f32) -> vec2f {
     let found = solved(m.square, lobe, share, m.middle);
@@ -243,7 +428,7 @@ fn log_below(x: f32) -> f32 {
     return select(-log(1.0 - x), x * (1.0 + x * (0.5 + x / 3.0)), x < 0.01);
 }
 
-fn phong(disk: Disk, mirror: vec3f, n: f32) -> f32 {
+fn phong(disk: Disk, c: Contour, mirror: vec3f, n: f32) -> f32 {
     let apart = mirror - disk.middle;
     let versine = 0.5 * dot(apart, apart);
     if versine >= 1.0 {
@@ -253,16 +438,30 @@ fn phong(disk: Disk, mirror: vec3f, n: f32) -> f32 {
     if disk.radius2 == 0.0 {
         return exp(-exponent);
     }
+    if shows(c, disk.middle, sqrt(0.5 / n)) {
+        let aside = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(mirror.x) > 0.7);
+        let x = normalize(cross(mirror, aside));
+        let y = cross(mirror, x);
+        let unit = sqrt(0.5 * n);
+        let off = vec2f(dot(x, disk.middle), dot(y, disk.middle));
+        let middle = off * (sqrt(exponent) / max(length(off), 1e-20));
+        let across = vec2f(dot(x, c.across), dot(y, c.across)) * unit;
+        let along = vec2f(dot(x, c.along), dot(y, c.along)) * unit;
+        let outline = Trapezoid(middle, across, along, c.taper);
+        let step = toward_lobe(outline, 0.5);
+        let met = normalize(disk.middle + c.across * step.x + c.along * step.y);
+        return met.z / disk.mean_cos * gaussian_over(outline);
+    }
     let share = 0.25 * disk.radius2 * n;
     let step = min(share / (1.0 + share), sqrt(disk.radius2 / (2.0 * max(versine, 1e-30))));
     return (disk.middle.z + step * apart.z) / disk.mean_cos * gaussian_over_disk(exponent, 2.0 * share);
 }
 
-fn ward(disk: Disk, outgoing: vec3f, alpha: f32, stretch: vec2f) -> f32 {
+fn ward(disk: Disk, c: Contour, outgoing: vec3f, alpha: f32, stretch: vec2f) -> f32 {
     let alpha2 = alpha * alpha;
-    // No direction of the disk makes a half vector with a smaller slope than this.
+    // No direction of the sender makes a half vector with a smaller slope than this.
     let h = disk.middle + outgoing;
-    let radius = sqrt(disk.radius2);
+    let radius = max(sqrt(disk.radius2), c.reach);
     let nearest = radius * max(stretch.x, stretch.y) + 4.0 * alpha * (h.z + radius);
     if dot(h.xy * stretch, h.xy * stretch) > nearest * nearest {
         return 0.0;
@@ -272,6 +471,11 @@ fn ward(disk: Disk, outgoing: vec3f, alpha: f32, stretch: vec2f) -> f32 {
         let stretched = first.slope * stretch;
         let tan2 = dot(first.slope, first.slope);
         return exp(-dot(stretched, stretched) / alpha2) * (1.0 + tan2) * first.inv_z * first.inv_z;
+    }
+    if shows(c, disk.middle, alpha / max(stretch.x, stretch.y)) {
+        let met = within(disk, c, outgoing, stretch, first, 0.5 * alpha2);
+        let factor = met.meeting.weight * (1.0 + met.meeting.tan2) / (met.meeting.h.z * met.meeting.h.z);
+        return factor * gaussian_over(scaled(met.outline, 1.0 / alpha));
     }
     let meeting = meeting_of(disk, outgoing, stretch, first, 0.5 * alpha2);
     let is_round = stretch.x == 1.0 && stretch.y == 1.0;
@@ -292,8 +496,14 @@ fn visibility(alpha2: f32, i: f32, o: f32) -> f32 {
     return 0.5 / (o * roots.x + i * roots.y);
 }
 
+// The lobe where it meets a sender, over which its density of slopes is this.
+fn at_meeting(m: Meeting, density: f32, alpha2: f32, outgoing: vec3f) -> f32 {
+    let inv_cos2 = 1.0 + m.tan2;
+    return density * m.weight * inv_cos2 * inv_cos2 * visibility(alpha2, m.incident.z, outgoing.z);
+}
+
 // The lobe D G / (4 (V·N) (L·N)), w for it, and w averaged over the disk.
-fn ggx(disk: Disk, outgoing: vec3f, alpha: f32) -> vec3f {
+fn ggx(disk: Disk, c: Contour, outgoing: vec3f, alpha: f32) -> vec3f {
     let alpha2 = alpha * alpha;
     let h = disk.middle + outgoing;
     if disk.radius2 == 0.0 {
@@ -302,14 +512,18 @@ fn ggx(disk: Disk, outgoing: vec3f, alpha: f32) -> vec3f {
         return vec3f(alpha2 / PI * ratio * ratio * visibility(alpha2, disk.middle.z, outgoing.z), w, w);
     }
     let first = slopes_of(disk.middle, outgoing, vec2f(1.0));
-    let variance = 0.25 * (alpha2 + dot(first.slope, first.slope));
+    let width2 = alpha2 + dot(first.slope, first.slope);
+    let variance = 0.25 * width2;
+    if shows(c, disk.middle, sqrt(width2)) {
+        let met = within(disk, c, outgoing, vec2f(1.0), first, variance);
+        let density = ggx_over(scaled(met.outline, 1.0 / alpha)) / (PI * alpha2);
+        return vec3f(at_meeting(met.meeting, density, alpha2, outgoing), schlick(met.meeting.h), schlick(h));
+    }
     let meeting = meeting_of(disk, outgoing, vec2f(1.0), first, variance);
     let root = rounded(meeting, alpha2, 1.0).x;
     let squared = rounded(meeting, alpha2 + meeting.tan2, 1.0).y;
     let density = ggx_over_disk(squared / alpha2, (root - alpha2) / alpha2) / (PI * alpha2);
-    let inv_cos2 = 1.0 + meeting.tan2;
-    let factor = meeting.weight * inv_cos2 * inv_cos2 * visibility(alpha2, meeting.incident.z, outgoing.z);
-    return vec3f(density * factor, schlick(meeting.h), schlick(h));
+    return vec3f(at_meeting(meeting, density, alpha2, outgoing), schlick(meeting.h), schlick(h));
 }
 
 // What compensated albedos leave of 1, at a cosine.
@@ -328,16 +542,16 @@ fn per(loss: f32) -> f32 {
     return select(0.0, 1.0 / (PI * max(loss, 1e-4)), loss > 1e-4);
 }
 
-// Glossy BRDF of a lobe, averaged over a disk.
-fn reflected(place: u32, disk: Disk, outgoing: vec3f, own_color: bool, color: vec3f) -> vec3f {
+// Glossy BRDF of a lobe, averaged over a sender.
+fn reflected(place: u32, disk: Disk, c: Contour, outgoing: vec3f, own_color: bool, color: vec3f) -> vec3f {
     let shape = reflectors[place];
     let tint = reflectors[place + 1u];
     let last = reflectors[place + 2u];
     if (KINDS & 1u) != 0u && shape.x < 0.5 {
-        return tint.rgb * phong(disk, vec3f(-outgoing.xy, outgoing.z), shape.y);
+        return tint.rgb * phong(disk, c, vec3f(-outgoing.xy, outgoing.z), shape.y);
     }
     if (KINDS & 2u) != 0u && shape.x < 1.5 {
-        return tint.rgb * ward(disk, outgoing, shape.y, last.xy);
+        return tint.rgb * ward(disk, c, outgoing, shape.y, last.xy);
     }
     if (KINDS & 12u) == 0u {
         return vec3f(0.0);
@@ -345,7 +559,7 @@ fn reflected(place: u32, disk: Disk, outgoing: vec3f, own_color: bool, color: ve
     let base = select(clamp(color, vec3f(0.0), vec3f(1.0)), tint.rgb, own_color);
     let metallic = tint.w;
     let f0 = DIELECTRIC_F0 * (1.0 - metallic) + base * metallic;
-    let found = ggx(disk, outgoing, shape.y);
+    let found = ggx(disk, c, outgoing, shape.y);
     let single = f0 * (found.x * (1.0 - found.y)) + found.x * found.y;
     if (KINDS & 8u) == 0u || shape.x < 2.5 {
         return single + base * ((1.0 - metallic) / PI * (1.0 - DIELECTRIC_F0) * (MEAN_W - found.z));
@@ -393,12 +607,14 @@ fn glossy(in: Sampled, color: vec3f) -> vec3f {
     for (var i = leaf.first; i < leaf.first + leaf.count; i++) {
         let run = runs[i];
         for (var k = run.x; k < run.y; k++) {
-            let incident = arrived(arrivals[k], in.point, axes);
-            let overlap = select(head.w, 1.0, (arrivals[k].kind & SHINES) != 0u);
+            let incident = arrived(arrivals[k], in.point, axes, head.y);
+            let contour = incident.contour;
+            let overlap = select(head.w, 1.0, (arrivals[k].kind & SHINES) != 0u || contour.reach > 0.0);
             let disk = disk_of(incident.direction, max(incident.extent * overlap, head.y));
             if disk.mean_cos > 0.0 && any(incident.irradiance > vec3f(0.0)) {
                 for (var lobe = 0u; lobe < lobes; lobe++) {
-                    sum += incident.irradiance * reflected(material + 2u + 3u * lobe, disk, outgoing, own_color, color);
+                    let place = material + 2u + 3u * lobe;
+                    sum += incident.irradiance * reflected(place, disk, contour, outgoing, own_color, color);
                 }
             }
         }

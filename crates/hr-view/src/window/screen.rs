@@ -68,7 +68,7 @@ impl Prepared {
         let mesh = walk.mesh();
         mesh.check()?;
         let parts = Parts::new(walk.as_ref(), capacity, wants_pixels);
-        Ok(Self { parts, wants_pixels, tone: Tone::for_mesh(mesh), tour: walk.tour(), walk })
+        Ok(Self { parts, wants_pixels, tone: Tone::for_start(walk.as_ref()), tour: walk.tour(), walk })
     }
 }
 

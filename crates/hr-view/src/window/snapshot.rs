@@ -65,8 +65,8 @@ impl Snapshot {
         let view = View::of_camera(camera);
         let mut shown = Shown::new(&gpu, &layouts, walk, Parts::new(walk, gpu.capacity(), walk.prefers_pixels()))?;
         shown.follow(&gpu, walk, &view, size, 0.0);
-        let automatic = Tone::for_mesh(mesh);
-        let frame = Frame { view: &view, tone: tone.unwrap_or(&automatic), mesh, gauge: Gauge::OFF, marks: &[] };
+        let tone = tone.copied().unwrap_or_else(|| Tone::for_view(walk, camera));
+        let frame = Frame { view: &view, tone: &tone, mesh, gauge: Gauge::OFF, marks: &[] };
         Self::draw(&gpu, &layouts, &shown.buffers, size, &frame)
     }
 

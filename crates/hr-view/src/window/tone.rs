@@ -3,9 +3,10 @@
 //! The same formula runs in the shader, with every constant of it in the uniforms; [`Tone::apply`] is what the shader
 //! is tested against. It is that of saved pictures ([`hr_scene::tonemap`]), which says why it is so.
 
-use crate::display::DisplayMesh;
+use crate::display::{DisplayMesh, Walkable};
 use glam::{Mat3, Vec3};
 use glossy_ext::Rgb;
+use hr_scene::Camera;
 use hr_scene::tonemap::Meter;
 
 /// A filmic curve y = x (a x + b) / (x (c x + d) + e), the common form of the usual rational fits.
@@ -61,6 +62,19 @@ const TINY: f32 = 1e-30;
 const HIGHLIGHTS: f64 = 0.02;
 
 impl Tone {
+    /// For what a camera sees of a solution ([`Walkable::exposure`]), or where that is not known [for its mesh](Self::for_mesh).
+    #[must_use]
+    pub fn for_view(walk: &dyn Walkable, camera: &Camera) -> Self {
+        let of_mesh = Self::for_mesh(walk.mesh());
+        Self { exposure: walk.exposure(camera).map_or(of_mesh.exposure, printable), ..of_mesh }
+    }
+
+    /// For what is seen first of a solution.
+    #[must_use]
+    pub fn for_start(walk: &dyn Walkable) -> Self {
+        walk.cameras().first().map_or_else(|| Self::for_mesh(walk.mesh()), |(_, camera)| Self::for_view(walk, camera))
+    }
+
     /// For a mesh, exposed so that the geometric mean of its diffuse radiance becomes middle grey, or darker where more
     /// than a fiftieth of it would burn out ([`Meter`]). Area counts, so that it does not depend on how finely surfaces
     /// are meshed; where no diffuse surface is lit, emission does.
@@ -70,7 +84,7 @@ impl Tone {
         let diffuse = |v: usize| mesh.irradiance[v] * mesh.tint[v];
         let emitted = |v: usize| mesh.emission[v];
         let factor = metered(mesh, diffuse).or_else(|| metered(mesh, emitted));
-        let exposure = factor.map_or(1.0, |factor| factor.clamp(1e-20, 1e20) as f32);
+        let exposure = factor.map_or(1.0, |factor| printable(factor as f32));
         Self { exposure, to_srgb, curve: Curve::ACES_FIT }
     }
 
@@ -86,6 +100,11 @@ impl Tone {
         let printed = Vec3::splat(dark) + (color - low) * ((bright - dark) / (high - low).max(TINY));
         Vec3::from_array(printed.to_array().map(srgb_encode))
     }
+}
+
+/// A factor that leaves room for what it is multiplied by.
+fn printable(factor: f32) -> f32 {
+    factor.clamp(1e-20, 1e20)
 }
 
 /// The nearest finite colour, black where not a number: shaders are not bound to carry infinities and NaN through.

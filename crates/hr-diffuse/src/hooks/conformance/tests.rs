@@ -1,6 +1,7 @@
 //! A host of two leaves below a root, right at first, and then wrong in one way after the other.
 
 use super::*;
+use crate::hooks::Sides;
 use std::f32::consts::PI;
 
 /// An extension that only adds up irradiance, of material 0.
@@ -39,6 +40,7 @@ struct Host {
     radii: [f32; 3],
     normals: [Cone; 3],
     materials: [Option<u32>; 3],
+    sides: Sides,
     direction: Vec3,
     irradiance: Rgb,
     oriented: bool,
@@ -56,6 +58,7 @@ impl Host {
             radii: [1.5, 0.5, 0.5],
             normals: [Cone::SPHERE, Cone::single(Vec3::Z), Cone::single(-Vec3::Z)],
             materials: [None, Some(0), Some(1)],
+            sides: Sides { across: 0.3 * Vec3::X, along: 0.4 * Vec3::Y, taper: 0.0 },
             direction: Vec3::Z,
             irradiance: Rgb::splat(2.0),
             oriented: true,
@@ -98,6 +101,9 @@ impl Hierarchy for Host {
     fn material(&self, node: NodeId) -> Option<u32> {
         self.materials[node.index()]
     }
+    fn sides(&self, sender: NodeId) -> Option<Sides> {
+        (sender.0 == 2).then_some(self.sides)
+    }
 }
 
 #[test]
@@ -112,7 +118,7 @@ fn a_host_that_conforms_passes() {
 #[test]
 fn every_fault_is_found() {
     type Wrong = (fn(&mut Host), &'static str);
-    let cases: [Wrong; 16] = [
+    let cases: [Wrong; 19] = [
         (|h| h.direction = 2.0 * Vec3::Z, "not a unit vector"),
         (|h| h.irradiance.x = f32::NAN, "negative or not finite"),
         (|h| h.direction = -Vec3::Z, "from direction"),
@@ -129,6 +135,9 @@ fn every_fault_is_found() {
         (|h| h.normals[0] = Cone::single(Vec3::X), "does not hold its child 1: its normals"),
         (|h| h.away = Some(Vec3::ONE), "radiance is asked for in"),
         (|h| h.arrived.irradiance *= PI, "add up to 0.318 times"),
+        (|h| h.sides.across.x = 0.31, "node 2: `sides` are not finite, reach beyond the radius"),
+        (|h| h.sides.along.y = f32::NAN, "node 2: `sides`"),
+        (|h| h.sides.taper = -0.1, "node 2: `sides`"),
     ];
     for (spoil, expected) in cases {
         let mut host = Host::right();
