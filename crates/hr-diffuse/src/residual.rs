@@ -37,6 +37,8 @@ pub(crate) struct Residual {
     pub(crate) absolute: f32,
     /// … and the same with its sign: positive where there should be more light.
     pub(crate) signed: f32,
+    /// Relative standard error of `absolute`.
+    pub(crate) uncertain: f32,
     /// Share of the light that was reflected before.
     pub(crate) indirect: f32,
     /// Rays shot.
@@ -114,13 +116,15 @@ pub(crate) fn residual<L: LightField>(
         let part = found.len()..count.min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
         found.par_extend(part.into_par_iter().with_min_len(1).map(look));
     }
-    let (mut absolute, mut noise, mut signed, mut total, mut direct, mut rays) = (0.0, 0.0, 0.0, 0.0, 0.0, 0);
+    let (mut absolute, mut squares, mut noise, mut signed, mut total, mut direct, mut rays) =
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0);
     for leaf in &found {
         let [a, b] = leaf.estimates.map(f64::from);
         let solution = f64::from(leaf.solution);
         let share = (mean + solution).recip();
         let off = 0.5 * (a + b) - solution;
         absolute += share * off.abs();
+        squares += (share * off).powi(2);
         noise += share * (0.5 * (a - b)).abs();
         signed += share * off;
         total += share * 0.5 * (a + b);
@@ -130,11 +134,13 @@ pub(crate) fn residual<L: LightField>(
     if total <= 0.0 {
         return Some(Residual { rays, ..Residual::default() });
     }
+    let uncertain = squares.sqrt() / absolute.max(f64::MIN_POSITIVE);
     // Half the difference of the estimates is distributed as the noise of their mean.
     let absolute = (absolute * absolute - noise * noise).max(0.0).sqrt();
     Some(Residual {
         absolute: (absolute / total) as f32,
         signed: (signed / total) as f32,
+        uncertain: uncertain as f32,
         indirect: (1.0 - direct / total).clamp(0.0, 1.0) as f32,
         rays,
     })

@@ -8,6 +8,7 @@ use crate::error::SolveError;
 use crate::hooks::LightField;
 use crate::links::Links;
 use crate::refine::Pair;
+use crate::residual::Residual;
 use crate::solution::Solution;
 use crate::solver::{Settings, Solver};
 use std::collections::HashSet;
@@ -21,11 +22,13 @@ const STEP: f32 = 0.6;
 const ACCEPTED: f32 = 0.9;
 /// The next pass aims at that, as if the error shrank with the square root of the tolerance, which is halved at least once and so many
 /// times at most, …
-const MOST_HALVES: f32 = 2.0;
+const MOST_HALVES: f32 = 3.0;
 /// … down to this tolerance over the error asked for: where more error is left it does not come from links that are too coarse.
-const FINEST: f32 = 0.375;
-/// Where an error of more than this share is left at half of the tolerance, or less, it does not come from there either.
+const FINEST: f32 = 0.25;
+/// Where an error of more than this share is left at half of the tolerance, or less, it does not come from there either; …
 const NO_BETTER: f32 = 0.85;
+/// … if what was found is known as well as this (relative standard error).
+const KNOWN: f32 = 0.1;
 
 /// What is left to be done of a solution.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,17 +60,18 @@ impl Unfinished {
             return Some(next.copied().unwrap_or(self.tolerance));
         }
         let in_vain = self.in_vain && self.tolerance < error;
-        let done = self.found <= ACCEPTED * error || self.tolerance <= FINEST * error || in_vain;
+        let done = self.found <= ACCEPTED * error || 0.5 * self.tolerance < FINEST * error || in_vain;
         // Whole halves, so that what rays happen to find seldom makes another solution.
         let halves = (2.0 * (self.found / (ACCEPTED * error)).log2()).round().clamp(1.0, MOST_HALVES);
         (!done).then(|| (self.tolerance * (-halves).exp2()).max(FINEST * error))
     }
 
     /// Takes note of a pass, and of the error that was found after it, if anybody looked.
-    pub(crate) fn done(&mut self, tolerance: f32, found: Option<f32>) {
+    pub(crate) fn done(&mut self, tolerance: f32, found: Option<&Residual>) {
         let finer = tolerance <= 0.5 * self.tolerance;
-        self.in_vain = finer && found.is_some_and(|found| found > NO_BETTER * self.found);
-        (self.tolerance, self.found) = (tolerance, found.unwrap_or(f32::INFINITY));
+        let no_better = |found: &Residual| found.error() > NO_BETTER * self.found && found.uncertain < KNOWN;
+        self.in_vain = finer && found.is_some_and(no_better);
+        (self.tolerance, self.found) = (tolerance, found.map_or(f32::INFINITY, Residual::error));
     }
 
     /// Looks at pairs with a coarse link as if they had none.
@@ -124,11 +128,12 @@ mod tests {
     use super::*;
 
     /// Tolerances of the passes, where each of them finds what `found` says of its tolerance.
-    fn passes(error: f32, unfinished: &mut Unfinished, found: impl Fn(f32) -> f32) -> Vec<f32> {
+    fn passes(error: f32, unfinished: &mut Unfinished, uncertain: f32, found: impl Fn(f32) -> f32) -> Vec<f32> {
         let mut passes = Vec::new();
         while let Some(tolerance) = unfinished.next(error) {
             let (_, closely) = is_worth(tolerance, error);
-            unfinished.done(tolerance, closely.then(|| found(tolerance)));
+            let found = Residual { absolute: found(tolerance), uncertain, ..Residual::default() };
+            unfinished.done(tolerance, closely.then_some(&found));
             passes.push(tolerance);
         }
         passes
@@ -138,14 +143,17 @@ mod tests {
     fn passes_end_where_finer_links_bring_nothing() {
         let firsts = first_tolerances(0.05).to_vec();
         let mut fine = Unfinished::new(Vec::new());
-        assert_eq!(passes(0.05, &mut fine, |_| 0.02), firsts, "it is fine already");
+        assert_eq!(passes(0.05, &mut fine, 0.0, |_| 0.02), firsts, "it is fine already");
         let mut shrinks = Unfinished::new(Vec::new());
-        let more = passes(0.05, &mut shrinks, |tolerance| 0.3 * tolerance.sqrt());
+        let more = passes(0.05, &mut shrinks, 0.0, |tolerance| 0.3 * tolerance.sqrt());
         assert!(more.len() > firsts.len() && shrinks.found <= 0.05, "as long as it helps: {more:?}");
         let mut stays = Unfinished::new(Vec::new());
-        let once = passes(0.05, &mut stays, |_| 0.08);
+        let once = passes(0.05, &mut stays, 0.0, |_| 0.06);
         assert_eq!(once.len(), firsts.len() + 1, "once to see, and no more: {once:?}");
         assert_eq!(stays.next(0.05), None);
-        assert!(stays.next(0.01).is_some(), "who asks for much less may have it tried");
+        let mut unknown = Unfinished::new(Vec::new());
+        let tried = passes(0.05, &mut unknown, 1.0, |_| 0.06);
+        assert!(tried.len() > once.len(), "what nobody knows does not end it: {tried:?}");
+        assert!(stays.next(0.02).is_some(), "who asks for much less may have it tried");
     }
 }

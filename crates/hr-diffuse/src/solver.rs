@@ -14,7 +14,7 @@ use crate::links::Links;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::Senders;
 use crate::relight::Linked;
-use crate::residual::{RAYS_PER_LEAF, residual};
+use crate::residual::{RAYS_PER_LEAF, Residual, residual};
 use crate::resume::{Unfinished, is_worth};
 use crate::shadows;
 use crate::shooting::Shot;
@@ -284,9 +284,7 @@ impl<L: LightField> Solver<L> {
             if pass.closely && !stopped {
                 self.calibrate(pass, &mut stopped, watch);
             }
-            if pass.closely && !stopped {
-                self.check(pass, &mut stopped, watch);
-            }
+            let found = if pass.closely && !stopped { self.check(pass, &mut stopped, watch) } else { None };
             self.measure();
             if self.stats.spent.is_some() {
                 // What is left to be done begins here; passes that refine nothing still link what light comes to.
@@ -295,7 +293,7 @@ impl<L: LightField> Solver<L> {
             if stopped || late || self.stats.spent.is_some() && pass.closely {
                 break;
             }
-            self.unfinished.done(tolerance, self.stats.error);
+            self.unfinished.done(tolerance, found.as_ref());
             number += 1;
         }
         if let Some(before) = goes_on {
@@ -442,7 +440,12 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Finds what the solution is off by.
-    fn check(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+    fn check(
+        &mut self,
+        pass: Pass,
+        stopped: &mut bool,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Option<Residual> {
         let start = Instant::now();
         let [least, most] = CHECKED_LEAVES;
         let count = (CHECK_SHARE * self.stats.rays as f32 / RAYS_PER_LEAF as f32) as u64;
@@ -451,12 +454,13 @@ impl<L: LightField> Solver<L> {
             *stopped = *stopped || watch(&progress).is_break();
             if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        if let Some(residual) = residual {
+        if let Some(residual) = &residual {
             self.stats.error = Some(residual.error());
             self.stats.bias = -residual.bias();
             self.stats.check_rays += residual.rays;
         }
         self.stats.seconds.check += start.elapsed().as_secs_f64();
+        residual
     }
 
     /// Begins a new series of iterations: the light is another one.
