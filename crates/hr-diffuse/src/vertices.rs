@@ -1,6 +1,6 @@
 //! Vertices for display: every leaf is shown as a fan about its middle, through its corners and through the corners that finer
 //! neighbours put on its edges, so that no crack opens where elements of different size meet. Where other surfaces stand on a
-//! leaf it is cut, and shown as several fans ([`contacts`](crate::contacts)).
+//! leaf it is cut, and shown as several fans (`contacts.rs`).
 
 use crate::Rgb;
 use crate::hierarchy::{Elements, Kind, SceneData};
