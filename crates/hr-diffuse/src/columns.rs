@@ -1,6 +1,6 @@
 //! Column sums: the directional light that a sender's links carry away is no more than it has.
 //!
-//! A link evaluates its sender's distribution in one direction, which stands for all that its receiver takes up. Where a
+//! A link evaluates its sender's distribution in a few directions, which stand for all that its receiver takes up. Where a
 //! lobe is narrower than that, links in its middle carry more power than the whole lobe has, and two mirrors that face each
 //! other would light each other up without end. So what the links of a sender carry is added up and scaled down to what it
 //! leaves to be reflected.
@@ -9,7 +9,7 @@ use crate::Rgb;
 use crate::hooks::LightField;
 use crate::links::Links;
 use crate::threads::prelude::*;
-use crate::transport::Light;
+use crate::transport::{Light, NEGLIGIBLE};
 
 /// Of what a leaf does not reflect diffusely, links may carry so much as directional light at first. What the links of a
 /// sender carry errs either way; to cut it off at what is right on average would lose light.
@@ -32,9 +32,9 @@ pub(crate) fn gains<L: LightField>(
         if !light.element(link.sender).active {
             return 0.0;
         }
-        let receiver = light.element(link.receiver);
-        let direction = light.direction_to(receiver.center, link.sender);
-        let power = light.directional(link.sender, -direction).max(Rgb::ZERO).element_sum();
+        let negligible = NEGLIGIBLE * light.exitant.irradiance[link.receiver as usize].max_element();
+        let power = light.directional_toward(link.sender, link.receiver, (link.factor, negligible));
+        let power = power.max(Rgb::ZERO).element_sum();
         power * link.factor * lit
     });
     let powers: Vec<f32> = powers.collect();

@@ -322,7 +322,7 @@ pub(crate) fn carried<L: LightField>(light: Light<'_, L>, link: &Link, spread: S
     }
     let direction = light.direction_to(light.element(link.receiver).center, link.sender);
     let before = shot.map_or(Rgb::ZERO, |shot| shot.emitted(light, link.sender, -direction));
-    (light.emitted(link.sender, -direction) - before) * visible
+    (light.emitted_toward(link) - before) * visible
 }
 
 /// What a link carries of unit radiosity, from senders that have any.

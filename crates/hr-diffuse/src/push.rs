@@ -276,8 +276,7 @@ pub(crate) fn spreads<L: LightField>(
 fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -> (Spread, f32) {
     let receiver = light.element(link.receiver);
     let even = if receiver.is_flat() || link.visibility == 0.0 { Spread::Even } else { Spread::Plain };
-    let direction = light.direction_to(receiver.center, link.sender);
-    let mean = light.emitted(link.sender, -direction).element_sum() * link.factor;
+    let mean = light.emitted_toward(link).element_sum() * link.factor;
     let least = match (is_shared(light, link.receiver), error) {
         (true, error) => FAINT_SHARE * error.unwrap_or(1.0).sqrt(),
         (false, Some(_)) if link.visibility >= 0.0 => OWN_SHARE,
@@ -406,8 +405,8 @@ fn renewed<L: LightField>(light: Light<'_, L>, sender: u32, at: Vec3, node: u32)
     (direction, (before / now.max(1e-12)).clamp(0.25, 4.0))
 }
 
-/// Points, normals and weights (sum 1) that stand for a leaf.
-fn sample_points(scene: &SceneData, element: &Element) -> SmallVec<[(Vec3, Vec3, f32); 4]> {
+/// Points, normals and weights (sum 1) that stand for a part of a surface.
+pub(crate) fn sample_points(scene: &SceneData, element: &Element) -> SmallVec<[(Vec3, Vec3, f32); 4]> {
     let geometry = &scene.surfaces()[element.source as usize];
     let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
     let points = geometry.quadrature(element.domain);

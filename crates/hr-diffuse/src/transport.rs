@@ -3,6 +3,7 @@
 use crate::form_factor::{self, CURVED_FAR, FAR};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField, NodeId};
+use crate::links::Link;
 use crate::oracle::spot_ramp;
 use crate::reflect::Senders;
 use crate::{Cone, Facing, LightKind, Rgb};
@@ -71,11 +72,24 @@ impl<L: LightField> Light<'_, L> {
         let element = self.element(sender);
         match element.kind {
             Kind::Light => self.scene.lights[element.source as usize].intensity,
-            Kind::Cluster | Kind::Front | Kind::Back => {
-                let directional = self.directional(sender, away) * self.exitant.gain[sender as usize];
-                (self.diffuse(sender, away) + directional).max(Rgb::ZERO)
-            }
+            Kind::Cluster | Kind::Front | Kind::Back => self.together(sender, away, self.directional(sender, away)),
         }
+    }
+
+    /// What a node with extent emits, by its [`directional`](Self::directional) part.
+    pub(crate) fn together(&self, sender: u32, away: Vec3, directional: Rgb) -> Rgb {
+        (self.diffuse(sender, away) + directional * self.exitant.gain[sender as usize]).max(Rgb::ZERO)
+    }
+
+    /// Mean of [`emitted`](Self::emitted) toward the receiver of a link.
+    pub(crate) fn emitted_toward(&self, link: &Link) -> Rgb {
+        let (sender, receiver) = (link.sender, link.receiver);
+        let away = -self.direction_to(self.element(receiver).center, sender);
+        if self.element(sender).kind == Kind::Light {
+            return self.emitted(sender, away);
+        }
+        let negligible = NEGLIGIBLE * self.exitant.irradiance[receiver as usize].max_element();
+        self.together(sender, away, self.directional_toward(sender, receiver, (link.factor, negligible)))
     }
 
     /// The diffuse part of [`emitted`](Self::emitted), emission included.
@@ -269,7 +283,11 @@ impl<L: LightField> Light<'_, L> {
             return (Rgb::ZERO, 0.0);
         }
         let away = if distance > 0.0 { to / distance } else { element.normals.axis };
-        let light = self.emitted(sender, away) * factor;
+        let light = match element.kind {
+            Kind::Light => self.emitted(sender, away),
+            _ => self.together(sender, away, self.directional_at(sender, (x, n), (factor, negligible))),
+        };
+        let light = light * factor;
         let share = match element.kind {
             Kind::Light => 0.0,
             _ if light == Rgb::ZERO => 0.0,

@@ -1,0 +1,228 @@
+//! Directional light on its way: a distribution is asked for several directions, between points of both ends of a link.
+//!
+//! A node's distribution depends on the direction alone, and a narrow lobe on all of it: one direction, from the middle of the
+//! sender to the middle of the receiver, finds the peak or misses it. The mean over both ends is what the link carries.
+
+use crate::Rgb;
+use crate::hierarchy::Kind;
+use crate::hooks::LightField;
+use crate::push::sample_points;
+use crate::transport::Light;
+use glam::Vec3;
+use smallvec::{SmallVec, smallvec};
+use std::f32::consts::PI;
+
+/// Where sender and receiver together subtend less than this (radians, half), one direction is as good as all: no lobe that
+/// travels is narrower.
+const NARROW: f32 = 0.02;
+/// Of a cluster's box, points are so far from its middle, in halves of its sides: a uniform box has the same variance.
+const SPREAD: f32 = 0.577;
+/// Pairs of points that a link is worth at least, if there are so many.
+const PAIRS: usize = 16;
+/// Of what is not flat, light is divided by a mean cosine of at least this: near the terminator both fade.
+const LEAST_COSINE: f32 = 0.05;
+
+/// A point that stands for a part of a node, its normal (zero where it has none), and its weight.
+type Point = (Vec3, Vec3, f32);
+
+impl<L: LightField> Light<'_, L> {
+    /// [`directional`](Self::directional) on the way to a receiver: its mean over both. Senders that bring less than `negligible`
+    /// through a link of this factor are asked for one direction.
+    pub(crate) fn directional_toward(&self, sender: u32, receiver: u32, (factor, negligible): (f32, f32)) -> Rgb {
+        let r = self.element(receiver);
+        let away = -self.direction_to(r.center, sender);
+        if !self.varies(sender, (r.center, r.radius), (factor, negligible)) {
+            return self.directional(sender, away);
+        }
+        let mut points = self.points(receiver);
+        if !r.is_flat() && r.is_patch() {
+            // What arrives is that on a plane that faces the sender.
+            points.retain(|(_, n, _)| n.dot(away) < 0.0);
+        }
+        if !r.is_flat() {
+            points.iter_mut().for_each(|(_, n, _)| *n = Vec3::ZERO);
+        }
+        self.mean_directional(sender, away, &points)
+    }
+
+    /// The same on the way to a point with normal `n`: the mean over the sender.
+    pub(crate) fn directional_at(&self, sender: u32, (x, n): (Vec3, Vec3), (factor, negligible): (f32, f32)) -> Rgb {
+        let away = -self.direction_to(x, sender);
+        if !self.varies(sender, (x, 0.0), (factor, negligible)) {
+            return self.directional(sender, away);
+        }
+        self.mean_directional(sender, away, &[(x, n, 1.0)])
+    }
+
+    /// Whether a sender's directional light has to be looked at from more than its middle.
+    fn varies(&self, sender: u32, (to, radius): (Vec3, f32), (factor, negligible): (f32, f32)) -> bool {
+        let element = self.element(sender);
+        let reach = element.radius + radius;
+        let wide = reach * reach > NARROW * NARROW * to.distance_squared(element.center);
+        wide && self.directional_most(sender) * factor > negligible
+    }
+
+    /// Points that stand for a node: of parts of surfaces those of a quadrature, of clusters four corners of a box.
+    fn points(&self, node: u32) -> SmallVec<[Point; 4]> {
+        let element = self.element(node);
+        if !element.is_patch() {
+            let [low, high] = element.bounds;
+            let (middle, half) = (0.5 * (low + high), 0.5 * SPREAD * (high - low));
+            let corners =
+                [Vec3::ONE, Vec3::new(-1.0, -1.0, 1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::new(1.0, -1.0, -1.0)];
+            return corners.into_iter().map(|corner| (middle + half * corner, Vec3::ZERO, 0.25)).collect();
+        }
+        sample_points(self.scene, element)
+    }
+
+    /// Mean of what a sender emits toward points of a receiver, weighted by the transfer's kernel; `away` leads to their middle.
+    fn mean_directional(&self, sender: u32, away: Vec3, points: &[Point]) -> Rgb {
+        let element = self.element(sender);
+        let state = self.exitant.reflected_as[sender as usize];
+        let standing = self.exitant.senders.of(state);
+        if standing.is_empty() || points.is_empty() {
+            return self.directional(sender, away);
+        }
+        // Leaves that stand for the sender are where they are; one that is all of it is all over it.
+        let own = if standing.len() == 1 || state != sender { self.points(sender) } else { smallvec![] };
+        let (mut sum, mut seen, mut all) = (Rgb::ZERO, 0.0, 0.0);
+        let places = standing.len().max(own.len());
+        for pair in 0..places * points.len().min(PAIRS.div_ceil(places)) {
+            let (place, turn) = (pair % places, pair / places);
+            let (leaf, share) = standing[place % standing.len()];
+            let (x, n, weight) = points[(place + turn) % points.len()];
+            let part = self.element(leaf);
+            let at = if own.is_empty() { part.center } else { own[place % own.len()].0 };
+            let d2 = at.distance_squared(x);
+            let toward = (at - x).normalize_or_zero();
+            let cosine = if n == Vec3::ZERO { 1.0 } else { toward.dot(n).max(0.0) };
+            // The radius takes the pole out of the kernel.
+            let kernel = weight * share * cosine / (d2 + 0.1 * element.radius * element.radius).max(1e-20);
+            if kernel <= 0.0 {
+                continue;
+            }
+            let facing = if part.is_flat() { part.normals.axis.dot(-toward).max(0.0) } else { 1.0 };
+            all += kernel;
+            seen += kernel * if part.is_flat() { facing } else { part.mean_cosine(-toward).max(LEAST_COSINE) };
+            if facing > 0.0 {
+                sum += self.field.radiance(&self.reflected[leaf as usize], -toward) * (facing * kernel * PI);
+            }
+        }
+        // Intensity per area over the mean cosine is mean radiance.
+        let over = if element.kind == Kind::Cluster { all } else { seen };
+        if over <= 0.0 {
+            return Rgb::ZERO;
+        }
+        sum * (standing.iter().map(|(_, share)| share).sum::<f32>() / over)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hooks::{Arrived, Hierarchy, NodeId, Transfer};
+    use crate::reflect::Senders;
+    use crate::sampling::point4;
+    use crate::{Cone, DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::{DVec3, Vec2};
+    use std::f32::consts::FRAC_1_PI;
+
+    /// What is sent does not depend on what arrives: a lobe around `axis` with this exponent.
+    struct Lobe {
+        axis: Vec3,
+        exponent: f32,
+    }
+
+    impl LightField for Lobe {
+        type Incident = ();
+        type Exitant = ();
+
+        fn active(&self, _: u32) -> Option<Rgb> {
+            Some(Rgb::splat(0.5))
+        }
+        fn clear(&self, (): &mut ()) {}
+        fn receive(&self, (): &mut (), _: &Transfer) {}
+        fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], _: Arrived) {}
+        fn radiance(&self, (): &(), away: Vec3) -> Rgb {
+            Rgb::splat(FRAC_1_PI * away.dot(self.axis).max(0.0).powf(self.exponent))
+        }
+        fn radiance_bounds(&self, (): &(), _: &Cone) -> (Rgb, Rgb) {
+            (Rgb::ZERO, Rgb::splat(FRAC_1_PI))
+        }
+    }
+
+    /// Unit squares, one of them 2 above the other and moved by `aside`; the lower one sends a lobe.
+    fn squares(aside: f64, axis: Vec3, exponent: f32) -> (Solver<Lobe>, [u32; 2]) {
+        let square = |o: DVec3, a: DVec3, b: DVec3| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), 0);
+        let surfaces =
+            vec![square(DVec3::ZERO, DVec3::X, DVec3::Y), square(DVec3::new(aside, 0.0, 2.0), DVec3::Y, DVec3::X)];
+        let material = DiffuseMaterial { reflectance: Rgb::splat(0.2), exitance: Rgb::ZERO, two_sided: false };
+        let input = SceneInput { surfaces, materials: vec![material], ..SceneInput::default() };
+        let field = Lobe { axis: axis.normalize(), exponent };
+        let mut solver = Solver::new(&input, Settings::with_error(0.1), field).expect("the scene is sound");
+        let nodes = [0, 1].map(|surface| solver.elements.surface_nodes[surface][0]);
+        let mut ranges = vec![[0; 2]; solver.elements.nodes.len()];
+        ranges[nodes[0] as usize] = [0, 1];
+        solver.exitant.senders = Senders { ranges, standing: vec![(nodes[0], 1.0)] };
+        solver.exitant.reflected_as = (0..solver.elements.nodes.len() as u32).collect();
+        solver.exitant.peak.fill(FRAC_1_PI);
+        (solver, nodes)
+    }
+
+    /// By many random pairs of points: what passes over what would of unit radiosity.
+    fn brute_force(solver: &Solver<Lobe>, [sender, receiver]: [u32; 2], at: Option<Vec3>) -> f32 {
+        let point = |node: u32, u: Vec2| {
+            let element = &solver.elements.nodes[node as usize];
+            solver.scene.surfaces()[element.source as usize].sample(element.domain, u.x, u.y)
+        };
+        let (mut sum, mut all) = (0.0, 0.0);
+        for i in 0..20_000 {
+            let u = point4(7, i);
+            let ((s, m), (r, n)) = (point(sender, Vec2::new(u.x, u.y)), point(receiver, Vec2::new(u.z, u.w)));
+            let x = at.unwrap_or(r);
+            let toward = (s - x).normalize();
+            let kernel = toward.dot(n).max(0.0) * (-toward).dot(m).max(0.0) / s.distance_squared(x);
+            all += kernel;
+            sum += kernel * PI * solver.field.radiance(&(), -toward).x;
+        }
+        sum / all
+    }
+
+    #[test]
+    fn lobes_count_by_their_mean_over_both_ends() {
+        let mut worst = [0.0_f32; 3];
+        for (aside, axis, exponent) in [
+            (0.0, Vec3::Z, 1.0),
+            (0.0, Vec3::Z, 30.0),
+            (0.0, Vec3::new(0.5, 0.3, 1.0), 30.0),
+            (1.5, Vec3::Z, 10.0),
+            (1.5, Vec3::new(1.0, 0.0, 1.0), 60.0),
+        ] {
+            let (solver, nodes @ [sender, receiver]) = squares(aside, axis, exponent);
+            let (light, all) = (solver.light(), (1.0, 0.0));
+            let truth = brute_force(&solver, nodes, None);
+            let (x, n) = (light.element(receiver).center, light.element(receiver).normals.axis);
+            let single = light.directional(sender, -light.direction_to(x, sender)).x;
+            let off = [
+                (single - truth).abs(),
+                (light.directional_toward(sender, receiver, all).x - truth).abs(),
+                (light.directional_at(sender, (x, n), all).x - brute_force(&solver, nodes, Some(x))).abs(),
+            ];
+            worst.iter_mut().zip(off).for_each(|(worst, off)| *worst = worst.max(off));
+        }
+        let [single, toward, at] = worst;
+        assert!(single > 0.5, "one direction is not enough: {single} of the peak");
+        assert!(toward < 0.05 && at < 0.1, "{toward}, {at} of the peak; {single} by one direction");
+    }
+
+    /// Where little is at stake, or both ends are far from each other, one direction is asked for.
+    #[test]
+    fn what_cannot_matter_is_not_looked_at() {
+        let (solver, [sender, receiver]) = squares(0.0, Vec3::Z, 30.0);
+        let light = solver.light();
+        let single = light.directional(sender, Vec3::Z);
+        assert_ne!(light.directional_toward(sender, receiver, (1.0, 0.9)), single);
+        assert_eq!(light.directional_toward(sender, receiver, (1.0, 1.1)), single, "at most 1 is sent");
+        assert!(!light.varies(sender, (Vec3::splat(100.0), 0.5), (1.0, 0.0)));
+    }
+}
