@@ -24,7 +24,7 @@ use glossy_ext::{Place, Reflector};
 use hr_diffuse::sampling::hash;
 use hr_diffuse::visibility::NO_BLOCKER;
 use hr_diffuse::{Geometry, Hit, Normalization, Rgb, SolveError, Visibility};
-use hr_scene::{Camera, Image, Scene};
+use hr_scene::{Camera, Film, Image, Pixel, Scene};
 use rayon::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
@@ -161,10 +161,11 @@ impl<'a> PathTracer<'a> {
     /// for any number of threads; others give independent ones. `watch` is told the share that is done.
     #[must_use]
     pub fn render(&self, camera: &Camera, paths: u32, seed: u32, watch: &(dyn Fn(f32) + Sync)) -> Reference {
-        self.render_until(&|_| None, camera, paths, seed, watch)
+        let (film, sigma) = self.render_until(&|_| None, camera, paths, seed, watch);
+        Reference { image: film.image, sigma }
     }
 
-    /// [`render`](Self::render) by paths that [end](End).
+    /// [`render`](Self::render) by paths that [end](End), on film, with its standard error.
     #[must_use]
     pub fn render_until(
         &self,
@@ -173,7 +174,7 @@ impl<'a> PathTracer<'a> {
         paths: u32,
         seed: u32,
         watch: &(dyn Fn(f32) + Sync),
-    ) -> Reference {
+    ) -> (Film, Image) {
         let paths = paths.max(1);
         let mut image = Image::new(camera.width, camera.height);
         let mut sigma = image.clone();
@@ -182,26 +183,32 @@ impl<'a> PathTracer<'a> {
         let view = View::new(camera);
         let done = AtomicU32::new(0);
         let rows = image.pixels.par_chunks_mut(width).zip(sigma.pixels.par_chunks_mut(width));
-        rows.enumerate().for_each(|(y, (row, sigmas))| {
-            for (x, (pixel, sigma)) in row.iter_mut().zip(sigmas).enumerate() {
+        let edges = rows.enumerate().flat_map_iter(|(y, (row, sigmas))| {
+            let mut edges = Vec::new();
+            for (x, (mean, sigma)) in row.iter_mut().zip(sigmas).enumerate() {
                 let seed = hash(hash(x as u32, y as u32), seed);
-                let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+                let (mut pixel, mut squares) = (Pixel::default(), DVec3::ZERO);
                 for index in 0..paths {
                     let sampler = Sampler::new(seed, index);
                     let direction = view.direction(Vec2::new(x as f32, y as f32), sampler.pair(0));
-                    let radiance = self.path(eye, direction, &sampler, end).as_dvec3();
-                    sum += radiance;
-                    squares += radiance * radiance;
+                    let (surface, radiance) = self.seen(eye, direction, &sampler, end);
+                    pixel.add(surface, radiance);
+                    squares += radiance.as_dvec3() * radiance.as_dvec3();
                 }
                 let n = f64::from(paths);
-                let mean = sum / n;
-                let variance = (squares / n - mean * mean).max(DVec3::ZERO) / (n - 1.0).max(1.0);
-                (*pixel, *sigma) = (mean.as_vec3(), variance.map(f64::sqrt).as_vec3());
+                *mean = pixel.radiance();
+                let variance = (squares / n - mean.as_dvec3() * mean.as_dvec3()).max(DVec3::ZERO) / (n - 1.0).max(1.0);
+                *sigma = variance.map(f64::sqrt).as_vec3();
+                if pixel.has_edge(0.0) {
+                    edges.push((y * width + x, pixel));
+                }
             }
             let rows = done.fetch_add(1, Ordering::Relaxed) + 1;
             watch(rows as f32 / camera.height as f32);
+            edges
         });
-        Reference { image, sigma }
+        let edges = edges.collect();
+        (Film::new(image, edges), sigma)
     }
 
     /// What a camera sees of the emitters themselves: their own radiance, without any reflection.
@@ -226,11 +233,17 @@ impl<'a> PathTracer<'a> {
 
     /// Radiance that arrives at `origin` (unit space) against the unit `direction`, by one path.
     #[must_use]
-    pub fn path(&self, mut origin: Vec3, mut direction: Vec3, sampler: &Sampler, end: &End<'_>) -> Rgb {
-        let (mut light, mut throughput) = (Rgb::ZERO, Rgb::ONE);
+    pub fn path(&self, origin: Vec3, direction: Vec3, sampler: &Sampler, end: &End<'_>) -> Rgb {
+        self.seen(origin, direction, sampler, end).1
+    }
+
+    /// The same with the surface that the path meets first.
+    fn seen(&self, mut origin: Vec3, mut direction: Vec3, sampler: &Sampler, end: &End<'_>) -> (Option<u32>, Rgb) {
+        let (mut light, mut throughput, mut first) = (Rgb::ZERO, Rgb::ONE, None);
         let (mut own, mut density) = (NO_BLOCKER, f32::INFINITY);
         for bounce in 0.. {
             let Some(hit) = self.visibility.closest_except(origin, direction, START, f32::MAX, own) else { break };
+            first = first.or(Some(hit.surface));
             let emitted = self.emitted(&hit);
             if emitted != Rgb::ZERO {
                 let other = self.emitters.density(hit.surface, hit.t, -hit.normal.dot(direction));
@@ -256,7 +269,7 @@ impl<'a> PathTracer<'a> {
             }
             (origin, direction, own, density) = (point.position, step.direction, point.surface, step.density);
         }
-        light
+        (first, light)
     }
 
     /// Radiance that the glossy part of a surface's BRDF reflects back against the unit `direction` where it was hit: the light

@@ -5,14 +5,14 @@
 //! a [path tracer](crate::path_tracer) end where they meet the solution, whose elements and mistakes are then seen blurred.
 
 use crate::glossy::{self, FOLLOWED, Mode, NARROWEST};
-use crate::path_tracer::{PathTracer, Ray};
+use crate::path_tracer::{PathTracer, Ray, Sampler};
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::haar::Haar;
 use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2, unit};
 use hr_diffuse::{Hit, NodeId, Rgb, Solution};
-use hr_scene::{Camera, Image, Material, Scene};
+use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
@@ -21,6 +21,9 @@ use std::sync::Arc;
 const LOBE_RAYS: usize = 6;
 /// Mirrors in mirrors end here.
 const MOST_BOUNCES: u32 = 4;
+/// Where surfaces meet in a pixel and differ by more than this share, so many times as many more rays tell how much is seen of each.
+const EDGE: f32 = 0.05;
+const EDGE_RAYS: u32 = 3;
 /// Paths of a final gather, for every ray of the other modes. With the grid of stills 63 per pixel, 4032 per 8 × 8 block:
 /// noise of a block's mean is 1 % where many lamps light rough and polished metal, else less.
 const GATHERED: u32 = 7;
@@ -69,38 +72,60 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// The image that a camera takes: linear radiance, W/(m² sr). `watch` is told the share that is done.
     #[must_use]
     pub fn render(&self, camera: &Camera, watch: &(dyn Fn(f32) + Sync)) -> Image {
+        self.expose(camera, 0, watch).image
+    }
+
+    /// The same image, to be printed: edges between surfaces are known better. See [`hr_scene::film`].
+    #[must_use]
+    pub fn film(&self, camera: &Camera, watch: &(dyn Fn(f32) + Sync)) -> Film {
+        self.expose(camera, EDGE_RAYS, watch)
+    }
+
+    /// With so many times as many rays more at edges, which do not enter the image.
+    fn expose(&self, camera: &Camera, at_edges: u32, watch: &(dyn Fn(f32) + Sync)) -> Film {
+        let rays = self.grid * self.grid;
         if self.mode == Mode::Gather {
-            return self
-                .tracer
-                .render_until(&|ray| self.end(ray), camera, self.grid * self.grid * GATHERED, 0, watch)
-                .image;
+            return self.tracer.render_until(&|ray| self.end(ray), camera, rays * GATHERED, 0, watch).0;
         }
         let mut image = Image::new(camera.width, camera.height);
         let width = camera.width as usize;
         let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
         let done = std::sync::atomic::AtomicU32::new(0);
-        image.pixels.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        let rows = image.pixels.par_chunks_mut(width).enumerate();
+        let edges = rows.flat_map_iter(|(y, row)| {
             let mut scratch = Vec::new();
-            for (x, pixel) in row.iter_mut().enumerate() {
+            let mut edges = Vec::new();
+            for (x, mean) in row.iter_mut().enumerate() {
                 let seed = hash(x as u32, y as u32 ^ 0x6b43);
-                let mut sum = Rgb::ZERO;
-                for i in 0..self.grid * self.grid {
-                    let cell = Vec2::new((i % self.grid) as f32, (i / self.grid) as f32);
-                    let within = (cell + point2(seed, i)) / self.grid as f32;
+                let mut look = |pixel: &mut Pixel, within: Vec2, i: u32| {
                     let (px, py) = (x as f64 + f64::from(within.x), y as f64 + f64::from(within.y));
                     let direction = camera.direction(px, py).as_vec3();
-                    sum += self.radiance(eye, direction, u32::MAX, 0, hash(seed, i), &mut scratch);
+                    let (surface, light) = self.seen(eye, direction, u32::MAX, 0, hash(seed, i), &mut scratch);
+                    pixel.add(surface, light);
+                };
+                let mut pixel = Pixel::default();
+                for i in 0..rays {
+                    let cell = Vec2::new((i % self.grid) as f32, (i / self.grid) as f32);
+                    look(&mut pixel, (cell + point2(seed, i)) / self.grid as f32, i);
                 }
-                *pixel = sum / (self.grid * self.grid) as f32;
+                *mean = pixel.radiance();
+                if at_edges > 0 && pixel.has_edge(EDGE) {
+                    for i in 0..at_edges * rays {
+                        look(&mut pixel, Sampler::new(seed, i).pair(0), rays + i);
+                    }
+                    edges.push((y * width + x, pixel));
+                }
             }
             let rows = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
             watch(rows as f32 / camera.height as f32);
+            edges
         });
-        image
+        let edges = edges.collect();
+        Film::new(image, edges)
     }
 
-    /// Radiance that arrives at `origin` (unit space) against `direction`.
-    fn radiance(
+    /// The surface that is seen from `origin` (unit space) in `direction`, and the radiance that arrives.
+    fn seen(
         &self,
         origin: Vec3,
         direction: Vec3,
@@ -108,12 +133,14 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         bounce: u32,
         seed: u32,
         scratch: &mut Vec<Incident>,
-    ) -> Rgb {
+    ) -> (Option<u32>, Rgb) {
         let visibility = &self.solution.scene.visibility;
-        let Some(hit) = visibility.closest_except(origin, direction, START, f32::MAX, own) else { return Rgb::ZERO };
+        let hit = visibility.closest_except(origin, direction, START, f32::MAX, own);
+        let Some(hit) = hit else { return (None, Rgb::ZERO) };
         let emitted = if hit.front { self.material(&hit).exitance * FRAC_1_PI } else { Rgb::ZERO };
-        let Some(leaf) = self.solution.leaf(&hit) else { return emitted };
-        emitted + self.leaving(hit, leaf, direction, bounce, seed, scratch)
+        let leaf = self.solution.leaf(&hit);
+        let reflected = leaf.map(|leaf| self.leaving(hit, leaf, direction, bounce, seed, scratch));
+        (Some(hit.surface), emitted + reflected.unwrap_or(Rgb::ZERO))
     }
 
     /// Where a path of a final gather ends, and what is reflected there. Mirrors are followed, and so are rays from too
@@ -219,6 +246,6 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         if direction.dot(met.hit.normal) * side <= 0.0 {
             return Rgb::ZERO;
         }
-        self.radiance(met.hit.point, direction, met.hit.surface, bounce + 1, seed, scratch)
+        self.seen(met.hit.point, direction, met.hit.surface, bounce + 1, seed, scratch).1
     }
 }
