@@ -5,17 +5,17 @@
 //! a [path tracer](crate::path_tracer) end where they meet the solution, whose elements and mistakes are then seen blurred.
 
 use crate::glossy::{self, FOLLOWED, Mode, NARROWEST};
-use crate::path_tracer::{PathTracer, Ray, Sampler};
+use crate::path_tracer::{Glow, Known, Nearby, PathTracer, Place as Lit, Ray, Sampler};
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::haar::Haar;
 use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2, unit};
-use hr_diffuse::{Hit, NodeId, Rgb, Solution};
+use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
 use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Rays that follow a narrow lobe, per ray of the pixel.
 const LOBE_RAYS: usize = 6;
@@ -24,11 +24,18 @@ const MOST_BOUNCES: u32 = 4;
 /// Where surfaces meet in a pixel and differ by more than this share, so many times as many more rays tell how much is seen of each.
 const EDGE: f32 = 0.05;
 const EDGE_RAYS: u32 = 3;
-/// Paths of a final gather, for every ray of the other modes. With the grid of stills 63 per pixel, 4032 per 8 × 8 block:
-/// noise of a block's mean is 1 % where many lamps light rough and polished metal, else less.
+/// Paths of a final gather, for every ray of the other modes, then as many more as make a power of two, which are spread best. With
+/// the grid of stills 64 per pixel, 4096 per 8 × 8 block: noise of a block's mean is 1 % where many lamps light rough and
+/// polished metal, else less.
 const GATHERED: u32 = 7;
 /// A path ends where a ray stands for at least so many times the leaf that it meets; else one would see the elements.
 const WIDE: f32 = 16.0;
+/// Parts of surfaces glow that reflect more than so many times the mean radiance, as shades around bulbs do: rays that happen to meet
+/// them would be noise, so light is drawn from them. Of these, those with most power.
+const GLOWING: f32 = 4.0;
+const MOST_GLOWING: usize = 1024;
+/// The darkest leaf of a part that glows has at least this share of the light of the brightest.
+const EVEN: f32 = 0.3;
 /// Rays start this far from their surface (unit space): what rounding needs.
 const START: f32 = 1e-6;
 
@@ -42,6 +49,10 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     grid: u32,
     /// For final gathers, and for what is in narrow lobes.
     tracer: PathTracer<'a>,
+    /// Nodes that glow, rising.
+    glowing: Vec<u32>,
+    /// For final gathers, by node, which emitters light it; found out of leaves where it is asked for.
+    nearby: Vec<OnceLock<Nearby>>,
 }
 
 /// A point that a ray met.
@@ -59,8 +70,13 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// For a scene and its solution.
     #[must_use]
     pub fn new(scene: &'a Scene, solution: &'a Solution<GlossyField<B>>, mode: Mode) -> Self {
-        let tracer = PathTracer::new(scene, &solution.scene.visibility);
-        Self { scene, solution, mode, grid: 3, tracer }
+        let glowing = if mode == Mode::Gather { glowing(scene, solution) } else { Vec::new() };
+        let glows: Vec<_> = glowing.iter().map(|&(node, light)| glow(solution, node, light)).collect();
+        let tracer = PathTracer::with_glow(scene, &solution.scene.visibility, &glows);
+        let nodes = if mode == Mode::Gather { solution.elements.nodes.len() } else { 0 };
+        let nearby = std::iter::repeat_with(OnceLock::new).take(nodes).collect();
+        let glowing = glowing.iter().map(|&(node, _)| node).collect();
+        Self { scene, solution, mode, grid: 3, tracer, glowing, nearby }
     }
 
     /// Rays per pixel, squared: 1…16. 3 by default. A final gather has more of them in proportion.
@@ -85,7 +101,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     fn expose(&self, camera: &Camera, at_edges: u32, watch: &(dyn Fn(f32) + Sync)) -> Film {
         let rays = self.grid * self.grid;
         if self.mode == Mode::Gather {
-            return self.tracer.render_until(&|ray| self.end(ray), camera, rays * GATHERED, 0, watch).0;
+            return self.tracer.render_until(self, camera, (rays * GATHERED).next_power_of_two(), 0, watch).0;
         }
         let mut image = Image::new(camera.width, camera.height);
         let width = camera.width as usize;
@@ -141,18 +157,6 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let leaf = self.solution.leaf(&hit);
         let reflected = leaf.map(|leaf| self.leaving(hit, leaf, direction, bounce, seed, scratch));
         (Some(hit.surface), emitted + reflected.unwrap_or(Rgb::ZERO))
-    }
-
-    /// Where a path of a final gather ends, and what is reflected there. Mirrors are followed, and so are rays from too
-    /// near or in too narrow a lobe, as long as there are not too many.
-    fn end(&self, ray: &Ray<'_>) -> Option<Rgb> {
-        let Some(leaf) = self.solution.leaf(ray.hit) else { return Some(Rgb::ZERO) };
-        let follows = ray.footprint() < WIDE * self.solution.elements.nodes[leaf.index()].area
-            || self.material(ray.hit).reflector.mirror() != Rgb::ZERO;
-        if follows && ray.bounce < MOST_BOUNCES {
-            return None;
-        }
-        Some(self.leaving(*ray.hit, leaf, ray.direction, ray.bounce.max(1), 0, &mut Vec::new()))
     }
 
     fn material(&self, hit: &Hit) -> &'a Material {
@@ -247,5 +251,98 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             return Rgb::ZERO;
         }
         self.seen(met.hit.point, direction, met.hit.surface, bounce + 1, seed, scratch).1
+    }
+}
+
+impl<B: Basis> Known for RayCaster<'_, B> {
+    /// Mirrors are followed, and so are rays from too near or in too narrow a lobe, as long as there are not too many.
+    fn end(&self, ray: &Ray<'_>) -> Option<Rgb> {
+        let Some(leaf) = self.solution.leaf(ray.hit) else { return Some(Rgb::ZERO) };
+        let follows = ray.footprint() < WIDE * self.solution.elements.nodes[leaf.index()].area
+            || self.material(ray.hit).reflector.mirror() != Rgb::ZERO;
+        if follows && ray.bounce < MOST_BOUNCES {
+            return None;
+        }
+        Some(self.leaving(*ray.hit, leaf, ray.direction, ray.bounce.max(1), 0, &mut Vec::new()))
+    }
+
+    fn nearby(&self, hit: &Hit) -> Option<&Nearby> {
+        let leaf = self.solution.leaf(hit)?;
+        Some(self.nearby.get(leaf.index())?.get_or_init(|| {
+            let element = &self.solution.elements.nodes[leaf.index()];
+            let place = Lit { surface: element.source, domain: element.domain, back: element.kind == Kind::Back };
+            Nearby::new(self.tracer.emitters(), &self.solution.scene.visibility, &place, leaf.0)
+        }))
+    }
+
+    fn glowing(&self, hit: &Hit) -> Option<u32> {
+        let leaf = self.solution.leaf(hit).filter(|_| !self.glowing.is_empty())?;
+        // One of them may be above the leaf.
+        let mut node = leaf;
+        loop {
+            if let Ok(place) = self.glowing.binary_search(&node.0) {
+                return Some(self.tracer.emitters().glowing(place));
+            }
+            node =
+                self.solution.elements.parent(node).filter(|up| self.solution.elements.nodes[up.index()].is_patch())?;
+        }
+    }
+}
+
+/// Parts of surfaces that reflect much more than others, rising, with their radiance, the mean of the channels: as large as they are
+/// about equally bright. Mirrors are none: they are followed.
+fn glowing<B: Basis>(scene: &Scene, solution: &Solution<GlossyField<B>>) -> Vec<(u32, f32)> {
+    let nodes = &solution.elements.nodes;
+    let radiance = |node: u32| {
+        let element = &nodes[node as usize];
+        let diffuse = element.reflectance * solution.exitant.irradiance[node as usize];
+        (diffuse + solution.exitant.directional[node as usize]).element_sum() * FRAC_1_PI / 3.0
+    };
+    let (mut light, mut area) = (0.0, 0.0);
+    for leaf in solution.elements.patch_leaves() {
+        let part = f64::from(nodes[leaf as usize].area);
+        (light, area) = (light + f64::from(radiance(leaf)) * part, area + part);
+    }
+    let least = GLOWING * (light / area) as f32;
+    let is_mirror = |node: u32| scene.materials[nodes[node as usize].material as usize].reflector.mirror() != Rgb::ZERO;
+    // Darkest and brightest leaf of each node.
+    let mut ranges = vec![[f32::INFINITY, 0.0_f32]; nodes.len()];
+    for leaf in solution.elements.patch_leaves() {
+        ranges[leaf as usize] = [radiance(leaf); 2];
+    }
+    for node in (1..nodes.len()).rev() {
+        let [low, high] = ranges[node];
+        let parent = &mut ranges[nodes[node].parent as usize];
+        *parent = [parent[0].min(low), parent[1].max(high)];
+    }
+    let mut found = Vec::new();
+    let mut open = vec![0];
+    while let Some(node) = open.pop() {
+        let (element, [low, high]) = (&nodes[node as usize], ranges[node as usize]);
+        let is_bright = high > least && high.is_finite();
+        if is_bright && element.is_patch() && low >= EVEN * high {
+            if !is_mirror(node) {
+                found.push((node, radiance(node)));
+            }
+        } else if is_bright {
+            open.extend(element.first_child..element.first_child + element.child_count);
+        }
+    }
+    let power = |&(node, light): &(u32, f32)| light * nodes[node as usize].area;
+    found.sort_by(|a, b| power(b).total_cmp(&power(a)));
+    found.truncate(MOST_GLOWING);
+    found.sort_unstable_by_key(|&(node, _)| node);
+    found
+}
+
+/// A node as an emitter.
+fn glow<B: Basis>(solution: &Solution<GlossyField<B>>, node: u32, light: f32) -> Glow {
+    let element = &solution.elements.nodes[node as usize];
+    Glow {
+        surface: element.source,
+        domain: element.domain,
+        back: element.kind == Kind::Back,
+        radiance: Rgb::splat(light),
+        area: element.area,
     }
 }
