@@ -10,7 +10,7 @@ use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::haar::Haar;
 use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
-use hr_diffuse::sampling::{hash, point2, unit};
+use hr_diffuse::sampling::{hash, point2};
 use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
 use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
 use rayon::prelude::*;
@@ -116,7 +116,8 @@ impl<'a, B: Basis> RayCaster<'a, B> {
                 let mut look = |pixel: &mut Pixel, within: Vec2, i: u32| {
                     let (px, py) = (x as f64 + f64::from(within.x), y as f64 + f64::from(within.y));
                     let direction = camera.direction(px, py).as_vec3();
-                    let (surface, light) = self.seen(eye, direction, u32::MAX, 0, hash(seed, i), &mut scratch);
+                    let sampler = Sampler::new(seed, i);
+                    let (surface, light) = self.seen(eye, direction, u32::MAX, 0, &sampler, &mut scratch);
                     pixel.add(surface, light);
                 };
                 let mut pixel = Pixel::default();
@@ -147,7 +148,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         direction: Vec3,
         own: u32,
         bounce: u32,
-        seed: u32,
+        sampler: &Sampler,
         scratch: &mut Vec<Incident>,
     ) -> (Option<u32>, Rgb) {
         let visibility = &self.solution.scene.visibility;
@@ -155,7 +156,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let Some(hit) = hit else { return (None, Rgb::ZERO) };
         let emitted = if hit.front { self.material(&hit).exitance * FRAC_1_PI } else { Rgb::ZERO };
         let leaf = self.solution.leaf(&hit);
-        let reflected = leaf.map(|leaf| self.leaving(hit, leaf, direction, bounce, seed, scratch));
+        let reflected = leaf.map(|leaf| self.leaving(hit, leaf, direction, bounce, sampler, scratch));
         (Some(hit.surface), emitted + reflected.unwrap_or(Rgb::ZERO))
     }
 
@@ -170,7 +171,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         leaf: NodeId,
         direction: Vec3,
         bounce: u32,
-        seed: u32,
+        sampler: &Sampler,
         scratch: &mut Vec<Incident>,
     ) -> Rgb {
         let material = self.material(&hit);
@@ -195,7 +196,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let mirrors = met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES;
         let glossy = match self.mode {
             Mode::Distributions => self.interpolated(&met),
-            Mode::Samples if bounce == 0 || mirrors => self.reflected(&met, bounce, seed, scratch),
+            Mode::Samples if bounce == 0 || mirrors => self.reflected(&met, bounce, sampler, scratch),
             Mode::Samples | Mode::Gather if faint != Rgb::ZERO => faint * irradiance * FRAC_1_PI,
             // Of leaves whose light no link asked for there is no distribution.
             Mode::Samples | Mode::Gather if self.solution.reflected[leaf.index()].is_empty() => {
@@ -214,30 +215,26 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     }
 
     /// Glossy radiance from the samples that arrive at the point, or along rays where the lobe is narrow.
-    fn reflected(&self, met: &Met, bounce: u32, seed: u32, scratch: &mut Vec<Incident>) -> Rgb {
+    fn reflected(&self, met: &Met, bounce: u32, sampler: &Sampler, scratch: &mut Vec<Incident>) -> Rgb {
         let place = Place::along(met.hit.point, met.normal, met.reflector.grain());
         let outgoing = place.local(met.away);
         let mirror = met.reflector.mirror();
         let mut light = Rgb::ZERO;
         if mirror != Rgb::ZERO {
             let direction = met.normal * (2.0 * met.normal.dot(met.away)) - met.away;
-            light += mirror * self.along(met, direction, bounce, hash(seed, 11), scratch);
+            light += mirror * self.along(met, direction, bounce, &sampler.apart(0), scratch);
         }
         if met.reflector.glossy_albedo() == Rgb::ZERO {
             return light;
         }
         if met.reflector.lobe(outgoing).width < FOLLOWED {
-            let turn = unit(hash(seed, 12));
-            let turns: [Vec2; LOBE_RAYS] = std::array::from_fn(|i| {
-                let u = point2(hash(seed, 13), i as u32);
-                Vec2::new((u.x + turn).fract(), (u.y + i as f32) / LOBE_RAYS as f32).fract()
-            });
-            let pairs = [14, 15].map(|pair| point2(hash(seed, pair), 0));
+            let turns: [Vec2; LOBE_RAYS] = std::array::from_fn(|k| sampler.split(LOBE_RAYS as u32, k as u32).pair(1));
+            let pairs = [2, 3].map(|dimension| sampler.pair(dimension));
             let mut number = 0;
             let mut beyond = |hit: &Hit, direction| {
                 number += 1;
                 let Some(leaf) = self.solution.leaf(hit) else { return Rgb::ZERO };
-                self.leaving(*hit, leaf, direction, bounce + 1, hash(seed, 15 + number), scratch)
+                self.leaving(*hit, leaf, direction, bounce + 1, &sampler.apart(number), scratch)
             };
             return light + self.tracer.glossy(&met.hit, -met.away, pairs, &turns, &mut beyond);
         }
@@ -245,12 +242,12 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     }
 
     /// What is seen from a point along a direction; nothing below the surface.
-    fn along(&self, met: &Met, direction: Vec3, bounce: u32, seed: u32, scratch: &mut Vec<Incident>) -> Rgb {
+    fn along(&self, met: &Met, direction: Vec3, bounce: u32, sampler: &Sampler, scratch: &mut Vec<Incident>) -> Rgb {
         let side = if met.hit.front { 1.0 } else { -1.0 };
         if direction.dot(met.hit.normal) * side <= 0.0 {
             return Rgb::ZERO;
         }
-        self.seen(met.hit.point, direction, met.hit.surface, bounce + 1, seed, scratch).1
+        self.seen(met.hit.point, direction, met.hit.surface, bounce + 1, sampler, scratch).1
     }
 }
 
@@ -263,7 +260,7 @@ impl<B: Basis> Known for RayCaster<'_, B> {
         if follows && ray.bounce < MOST_BOUNCES {
             return None;
         }
-        Some(self.leaving(*ray.hit, leaf, ray.direction, ray.bounce.max(1), 0, &mut Vec::new()))
+        Some(self.leaving(*ray.hit, leaf, ray.direction, ray.bounce.max(1), &Sampler::new(0, 0), &mut Vec::new()))
     }
 
     fn nearby(&self, hit: &Hit) -> Option<&Nearby> {
