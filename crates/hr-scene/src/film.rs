@@ -17,6 +17,8 @@ use std::path::Path;
 struct Part {
     surface: Option<u32>,
     sum: DVec3,
+    /// Of the means of the channels.
+    squares: f64,
     samples: u32,
 }
 
@@ -30,9 +32,14 @@ impl Pixel {
     /// Adds the radiance, W/(m² sr), of a sample of a surface, or of none.
     pub fn add(&mut self, surface: Option<u32>, radiance: Rgb) {
         let sum = radiance.as_dvec3();
+        let squares = (sum.element_sum() / 3.0).powi(2);
         match self.parts.iter_mut().find(|part| part.surface == surface) {
-            Some(part) => (part.sum, part.samples) = (part.sum + sum, part.samples + 1),
-            None => self.parts.push(Part { surface, sum, samples: 1 }),
+            Some(part) => {
+                part.sum += sum;
+                part.squares += squares;
+                part.samples += 1;
+            }
+            None => self.parts.push(Part { surface, sum, squares, samples: 1 }),
         }
     }
 
@@ -50,6 +57,20 @@ impl Pixel {
         (high - low).max_element() > share * high.max_element()
     }
 
+    /// Standard error of what is seen of the surfaces, were samples independent, in terms of the mean; 0 where nothing is known of it.
+    #[must_use]
+    pub fn noise(&self) -> f32 {
+        let (mut variance, mut light) = (0.0, 0.0);
+        for part in &self.parts {
+            let (n, mean) = (f64::from(part.samples), part.sum.element_sum() / (3.0 * f64::from(part.samples)));
+            light += n * mean;
+            if part.samples > 1 {
+                variance += n * n * (part.squares / n - mean * mean).max(0.0) / (n - 1.0);
+            }
+        }
+        if light > 0.0 { (variance.sqrt() / light) as f32 } else { 0.0 }
+    }
+
     fn samples(&self) -> u32 {
         self.parts.iter().map(|part| part.samples).sum()
     }
@@ -60,15 +81,16 @@ impl Pixel {
 pub struct Film {
     /// Mean radiance of each pixel.
     pub image: Image,
-    /// Pixels that see several surfaces.
-    edges: Vec<(usize, Pixel)>,
+    /// Pixels that are printed from their own samples.
+    own: Vec<(usize, Pixel)>,
 }
 
 impl Film {
-    /// A picture, and those of its pixels that see several surfaces: their places in it and their samples.
+    /// A picture, and those of its pixels that are printed otherwise, because they see several surfaces or have more samples: their
+    /// places in it and their samples.
     #[must_use]
-    pub fn new(image: Image, edges: Vec<(usize, Pixel)>) -> Self {
-        Self { image, edges }
+    pub fn new(image: Image, own: Vec<(usize, Pixel)>) -> Self {
+        Self { image, own }
     }
 
     /// Saves as [`Image::save`] does; only a `.png` shows the difference.
@@ -87,7 +109,7 @@ impl Film {
     pub fn to_srgb8(&self, tone_map: &ToneMap, primaries: Primaries) -> Vec<u8> {
         let print = tone_map.print(&self.image.pixels, primaries);
         let mut codes: Vec<u8> = self.image.pixels.iter().flat_map(|&p| print.srgb8(p)).collect();
-        for (place, pixel) in &self.edges {
+        for (place, pixel) in &self.own {
             if let Some(code) = codes.chunks_exact_mut(3).nth(*place) {
                 code.copy_from_slice(&mixed(&print, pixel));
             }
@@ -139,6 +161,20 @@ mod tests {
             let radiance = film.image.pixels[0].x;
             assert!((f64::from(radiance) - 0.1 - 499.9 * share).abs() < 1e-3, "radiance is linear: {radiance}");
         }
+    }
+
+    #[test]
+    fn noise_is_that_within_surfaces() {
+        let mut pixel = Pixel::default();
+        assert_eq!(pixel.noise(), 0.0, "nothing is known");
+        for light in [1.0, 3.0, 1.0, 3.0] {
+            pixel.add(Some(0), Rgb::splat(light));
+        }
+        // Variance of the mean of 4: 1/(4 − 1); the mean is 2.
+        assert!((pixel.noise() - (1.0_f32 / 3.0).sqrt() / 2.0).abs() < 1e-6, "{}", pixel.noise());
+        (0..4).for_each(|_| pixel.add(Some(1), Rgb::splat(6.0)));
+        // Half of the pixel is sure, and the mean is 4.
+        assert!((pixel.noise() - 0.5 * (1.0_f32 / 3.0).sqrt() / 4.0).abs() < 1e-6, "{}", pixel.noise());
     }
 
     #[test]

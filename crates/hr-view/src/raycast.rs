@@ -15,15 +15,21 @@ use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
 use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, OnceLock};
 
 /// Rays that follow a narrow lobe, per ray of the pixel.
 const LOBE_RAYS: usize = 6;
 /// Mirrors in mirrors end here.
 const MOST_BOUNCES: u32 = 4;
-/// Where surfaces meet in a pixel and differ by more than this share, so many times as many more rays tell how much is seen of each.
+/// Where surfaces meet in a pixel and differ by more than this share, so many times as many more rays tell for a print how much is
+/// seen of each.
 const EDGE: f32 = 0.05;
-const EDGE_RAYS: u32 = 3;
+const EDGE_ROUNDS: u8 = 3;
+/// Where the standard error of a pixel is larger than this share of its light, there are as many more rays for a print as would
+/// make it that small, up to so many times as many. Its neighbours have as many, as some do not know how noisy they are.
+const NOISE: f32 = 0.04;
+const NOISE_ROUNDS: u8 = 7;
 /// Paths of a final gather, for every ray of the other modes, then as many more as make a power of two, which are spread best. With
 /// the grid of stills 64 per pixel, 4096 per 8 × 8 block: noise of a block's mean is 1 % where many lamps light rough and
 /// polished metal, else less.
@@ -66,6 +72,23 @@ struct Met {
     reflector: Arc<dyn Reflector>,
 }
 
+/// Rounds of rays that a pixel should have more than all have.
+#[derive(Clone, Copy, Default)]
+struct Wanted {
+    at_edge: u8,
+    by_noise: u8,
+}
+
+impl Wanted {
+    fn by(pixel: &Pixel) -> Self {
+        let times = (pixel.noise() / NOISE).powi(2);
+        Self {
+            at_edge: if pixel.has_edge(EDGE) { EDGE_ROUNDS } else { 0 },
+            by_noise: (times.ceil() - 1.0).clamp(0.0, f32::from(NOISE_ROUNDS)) as u8,
+        }
+    }
+}
+
 impl<'a, B: Basis> RayCaster<'a, B> {
     /// For a scene and its solution.
     #[must_use]
@@ -88,57 +111,80 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// The image that a camera takes: linear radiance, W/(m² sr). `watch` is told the share that is done.
     #[must_use]
     pub fn render(&self, camera: &Camera, watch: &(dyn Fn(f32) + Sync)) -> Image {
-        self.expose(camera, 0, watch).image
+        self.expose(camera, false, watch).image
     }
 
-    /// The same image, to be printed: edges between surfaces are known better. See [`hr_scene::film`].
+    /// The same image, to be printed: edges between surfaces, and what is noisy, are known better. See [`hr_scene::film`].
     #[must_use]
     pub fn film(&self, camera: &Camera, watch: &(dyn Fn(f32) + Sync)) -> Film {
-        self.expose(camera, EDGE_RAYS, watch)
+        self.expose(camera, true, watch)
     }
 
-    /// With so many times as many rays more at edges, which do not enter the image.
-    fn expose(&self, camera: &Camera, at_edges: u32, watch: &(dyn Fn(f32) + Sync)) -> Film {
+    /// To be printed or not: rays that are more than others have do not enter the image.
+    fn expose(&self, camera: &Camera, printed: bool, watch: &(dyn Fn(f32) + Sync)) -> Film {
         let rays = self.grid * self.grid;
         if self.mode == Mode::Gather {
             return self.tracer.render_until(self, camera, (rays * GATHERED).next_power_of_two(), 0, watch).0;
         }
         let mut image = Image::new(camera.width, camera.height);
-        let width = camera.width as usize;
-        let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
-        let done = std::sync::atomic::AtomicU32::new(0);
-        let rows = image.pixels.par_chunks_mut(width).enumerate();
-        let edges = rows.flat_map_iter(|(y, row)| {
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let mut wanted = vec![Wanted::default(); image.pixels.len()];
+        let done = AtomicU32::new(0);
+        let passes = if printed { 2 } else { 1 };
+        let tell = || {
+            let rows = done.fetch_add(1, Ordering::Relaxed) + 1;
+            watch(rows as f32 / (passes * camera.height) as f32);
+        };
+        let rows = image.pixels.par_chunks_mut(width).zip(wanted.par_chunks_mut(width));
+        rows.enumerate().for_each(|(y, (row, wanted))| {
             let mut scratch = Vec::new();
-            let mut edges = Vec::new();
-            for (x, mean) in row.iter_mut().enumerate() {
-                let seed = hash(x as u32, y as u32 ^ 0x6b43);
-                let mut look = |pixel: &mut Pixel, within: Vec2, i: u32| {
-                    let (px, py) = (x as f64 + f64::from(within.x), y as f64 + f64::from(within.y));
-                    let direction = camera.direction(px, py).as_vec3();
-                    let sampler = Sampler::new(seed, i);
-                    let (surface, light) = self.seen(eye, direction, u32::MAX, 0, &sampler, &mut scratch);
-                    pixel.add(surface, light);
-                };
-                let mut pixel = Pixel::default();
-                for i in 0..rays {
-                    let cell = Vec2::new((i % self.grid) as f32, (i / self.grid) as f32);
-                    look(&mut pixel, (cell + point2(seed, i)) / self.grid as f32, i);
-                }
-                *mean = pixel.radiance();
-                if at_edges > 0 && pixel.has_edge(EDGE) {
-                    for i in 0..at_edges * rays {
-                        look(&mut pixel, Sampler::new(seed, i).pair(0), rays + i);
-                    }
-                    edges.push((y * width + x, pixel));
-                }
+            for (x, (mean, wanted)) in row.iter_mut().zip(wanted).enumerate() {
+                let pixel = self.pixel(camera, x, y, 0, &mut scratch);
+                (*mean, *wanted) = (pixel.radiance(), Wanted::by(&pixel));
             }
-            let rows = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-            watch(rows as f32 / camera.height as f32);
-            edges
+            tell();
         });
-        let edges = edges.collect();
-        Film::new(image, edges)
+        let rows = if printed { height } else { 0 };
+        let more = (0..rows).into_par_iter().flat_map_iter(|y| {
+            let (wanted, tell) = (&wanted, &tell);
+            let mut scratch = Vec::new();
+            let row = move |x: usize| {
+                let around = || {
+                    (y.saturating_sub(1)..height.min(y + 2))
+                        .flat_map(|y| (x.saturating_sub(1)..width.min(x + 2)).map(move |x| y * width + x))
+                };
+                let noise = around().map(|i| wanted[i].by_noise).max().unwrap_or(0);
+                let rounds = noise.max(wanted[y * width + x].at_edge);
+                if x + 1 == width {
+                    tell();
+                }
+                (rounds > 0).then(|| (y * width + x, self.pixel(camera, x, y, u32::from(rounds), &mut scratch)))
+            };
+            (0..width).filter_map(row)
+        });
+        let more = more.collect();
+        Film::new(image, more)
+    }
+
+    /// What is seen in a pixel with some rounds of rays more than all have.
+    fn pixel(&self, camera: &Camera, x: usize, y: usize, rounds: u32, scratch: &mut Vec<Incident>) -> Pixel {
+        let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
+        let (rays, seed) = (self.grid * self.grid, hash(x as u32, y as u32 ^ 0x6b43));
+        let mut pixel = Pixel::default();
+        for i in 0..rays * (1 + rounds) {
+            let sampler = Sampler::new(seed, i);
+            let within = if i < rays {
+                let cell = Vec2::new((i % self.grid) as f32, (i / self.grid) as f32);
+                (cell + point2(seed, i)) / self.grid as f32
+            } else {
+                sampler.pair(0)
+            };
+            let (px, py) = (x as f64 + f64::from(within.x), y as f64 + f64::from(within.y));
+            let direction = camera.direction(px, py).as_vec3();
+            let (surface, light) = self.seen(eye, direction, u32::MAX, 0, &sampler, scratch);
+            pixel.add(surface, light);
+        }
+        pixel
     }
 
     /// The surface that is seen from `origin` (unit space) in `direction`, and the radiance that arrives.

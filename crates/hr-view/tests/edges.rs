@@ -1,4 +1,4 @@
-//! Edges of what is brighter than white, as they are printed.
+//! Edges of what is brighter than white, and what is noisy, as they are printed.
 
 use hr_diffuse::Settings;
 use hr_scene::{Camera, Exposure, Rgb, Scene, ToneMap};
@@ -56,4 +56,29 @@ fn lamps_have_smooth_edges_in_prints_and_radiance_stays_as_it_is() {
         assert!(printed < 0.04, "{mode:?}: {printed} off");
         assert!(averaged > 5.0 * printed, "{mode:?}: {averaged} off were it averaged as radiance");
     }
+}
+
+/// Where narrow lobes show lamps, rays of a pixel differ much.
+#[test]
+fn prints_of_what_is_noisy_have_more_rays() {
+    let scene = Arc::new(Scene::load("glossy-sphere").expect("built in"));
+    let settings = Settings::with_error(0.3);
+    let solved =
+        Solved::new(Arc::clone(&scene), settings, false, &mut |_| ControlFlow::Continue(())).expect("solvable");
+    let camera = Camera { width: 40, height: 30, ..scene.default_camera() };
+    let caster = |grid| RayCaster::new(&scene, &solved.solution, Mode::Samples).with_grid(grid);
+    let (film, fine) = (caster(2).film(&camera, &|_| ()), caster(6).film(&camera, &|_| ()));
+    assert_eq!(film.image, caster(2).render(&camera, &|_| ()), "radiance is that of any image");
+    let factor = ToneMap::default().factor(&fine.image.pixels, scene.primaries);
+    let map = ToneMap { exposure: Exposure::Factor(factor), ..ToneMap::default() };
+    let [right, printed, plain] = [
+        &fine.to_srgb8(&map, scene.primaries),
+        &film.to_srgb8(&map, scene.primaries),
+        &film.image.to_srgb8(&map, scene.primaries),
+    ]
+    .map(|codes| codes.iter().map(|&code| shown(code)).collect::<Vec<_>>());
+    let off = |codes: &[f32]| codes.iter().zip(&right).map(|(a, b)| (a - b).abs()).sum::<f32>();
+    let (printed, plain) = (off(&printed), off(&plain));
+    // Up to eight times as many rays.
+    assert!(printed < 0.6 * plain, "{printed} off where there are more rays, {plain} where there are not");
 }
