@@ -100,9 +100,9 @@ fn scene() -> Result<Scene, Box<dyn Error>> {
 fn main() -> Result<(), Box<dyn Error>> {
     let scene = Arc::new(scene()?);
     let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.1), true, &mut |_| ControlFlow::Continue(()))?;
-    let image = RayCaster::new(&scene, &solved.solution, Mode::Samples).render(&scene.cameras[0].1, &|_| ());
+    let film = RayCaster::new(&scene, &solved.solution, Mode::Samples).film(&scene.cameras[0].1, &|_| ());
     let path = Path::new("custom_reflector.png");
-    image.save(path, &ToneMap::default(), scene.primaries)?;
+    film.save(path, &ToneMap::default(), scene.primaries)?;
     println!("{}", std::path::absolute(path)?.display());
     Ok(())
 }

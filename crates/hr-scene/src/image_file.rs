@@ -67,6 +67,22 @@ impl Image {
     /// [`SceneError::Io`] where the file cannot be written.
     pub fn save(&self, path: &Path, tone_map: &ToneMap, primaries: Primaries) -> Result<(), SceneError> {
         let kind = ImageKind::of(path)?;
+        self.check(path)?;
+        write_whole(path, |out| match kind {
+            ImageKind::Pfm => self.write_pfm(out),
+            ImageKind::Exr => self.write_exr(out, primaries),
+            ImageKind::Png => self.write_png(out, &self.to_srgb8(tone_map, primaries)),
+        })
+    }
+
+    /// Saves a `.png` of three bytes for each pixel, which somebody else has printed.
+    pub(crate) fn save_codes(&self, path: &Path, codes: &[u8]) -> Result<(), SceneError> {
+        self.check(path)?;
+        write_whole(path, |out| self.write_png(out, codes))
+    }
+
+    /// Whether there are as many pixels as there should be.
+    fn check(&self, path: &Path) -> Result<(), SceneError> {
         if self.pixels.is_empty() || self.pixels.len() != self.width as usize * self.height as usize {
             return Err(SceneError::Syntax {
                 place: path.display().to_string(),
@@ -74,11 +90,7 @@ impl Image {
                 mend: "give width times height pixels, at least one".to_owned(),
             });
         }
-        write_whole(path, |out| match kind {
-            ImageKind::Pfm => self.write_pfm(out),
-            ImageKind::Exr => self.write_exr(out, primaries),
-            ImageKind::Png => self.write_png(out, tone_map, primaries),
-        })
+        Ok(())
     }
 
     /// Tone-mapped 8-bit sRGB, three bytes a pixel, row 0 on top.
@@ -118,11 +130,10 @@ impl Image {
         image.write().to_buffered(out).map_err(io::Error::other)
     }
 
-    fn write_png(&self, out: &mut impl Write, tone_map: &ToneMap, primaries: Primaries) -> io::Result<()> {
+    fn write_png(&self, out: &mut impl Write, codes: &[u8]) -> io::Result<()> {
         use image::ImageEncoder;
-        let bytes = self.to_srgb8(tone_map, primaries);
         image::codecs::png::PngEncoder::new(out)
-            .write_image(&bytes, self.width, self.height, image::ExtendedColorType::Rgb8)
+            .write_image(codes, self.width, self.height, image::ExtendedColorType::Rgb8)
             .map_err(io::Error::other)
     }
 }

@@ -4,6 +4,7 @@ pub mod builtin;
 pub mod camera;
 pub mod color;
 pub mod error;
+pub mod film;
 mod fingerprint;
 mod finish;
 pub mod gltf_file;
@@ -24,6 +25,7 @@ pub mod whole_file;
 
 pub use camera::Camera;
 pub use error::SceneError;
+pub use film::{Film, Pixel};
 pub use glossy_ext::Rgb;
 pub use image_file::{Image, ImageKind};
 pub use scene::{Material, Primaries, Scene, Warning};

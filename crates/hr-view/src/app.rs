@@ -17,7 +17,7 @@ use crate::solved::{Accuracy, Solved, Wanted};
 use crate::stats::{self, Times};
 use crate::window::WindowError;
 use hr_diffuse::{Budget, Phase, Settings};
-use hr_scene::{Camera, Exposure, ImageKind, Rgb, Scene, SceneError, ToneMap};
+use hr_scene::{Camera, Exposure, Film, ImageKind, Rgb, Scene, SceneError, ToneMap};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -199,9 +199,13 @@ impl Show<'_> {
     fn image(&self, path: &Path) -> Result<(), ViewError> {
         let scene = &self.solved.scene;
         let watch = |share| self.progress.at("taking the picture", share);
-        let image = self.caster().render(&scene.default_camera(), &watch);
-        self.warn_if_black(image.pixels.iter().all(|pixel| *pixel == Rgb::ZERO));
-        image.save(path, &ToneMap::default(), scene.primaries)?;
+        let (caster, camera) = (self.caster(), scene.default_camera());
+        let film = match ImageKind::of(path)? {
+            ImageKind::Png => caster.film(&camera, &watch),
+            ImageKind::Pfm | ImageKind::Exr => Film::new(caster.render(&camera, &watch), Vec::new()),
+        };
+        self.warn_if_black(film.image.pixels.iter().all(|pixel| *pixel == Rgb::ZERO));
+        film.save(path, &ToneMap::default(), scene.primaries)?;
         self.write_stats()
     }
 
@@ -234,8 +238,8 @@ impl Show<'_> {
             let watch = |share| self.progress.at("writing frames", (number as f32 + share) / FRAMES as f32);
             let camera =
                 if self.args.camera.is_some() || !path.is_empty() { camera } else { resized(camera, FRAME_SIZE) };
-            let image = caster.render(&camera, &watch);
-            image.save(&folder.join(format!("frame-{number:04}.png")), &tone_map, scene.primaries)?;
+            let film = caster.film(&camera, &watch);
+            film.save(&folder.join(format!("frame-{number:04}.png")), &tone_map, scene.primaries)?;
         }
         self.progress.say(&format!("{FRAMES} frames written to {}", folder.display()));
         self.write_stats()

@@ -12,19 +12,21 @@
 //! do not see the eye are bent until they just do, and no light passes below the true surface.
 
 mod emitters;
+mod nearby;
 mod sampler;
 #[cfg(test)]
 mod tests;
 
-pub use emitters::{Arrival, Emitters};
+pub use emitters::{Arrival, Draws, Emitters, Glow};
+pub use nearby::{Nearby, Place};
 pub use sampler::Sampler;
 
 use glam::{DVec3, Vec2, Vec3};
-use glossy_ext::{Place, Reflector};
+use glossy_ext::{Place as Frame, Reflector};
 use hr_diffuse::sampling::hash;
 use hr_diffuse::visibility::NO_BLOCKER;
 use hr_diffuse::{Geometry, Hit, Normalization, Rgb, SolveError, Visibility};
-use hr_scene::{Camera, Image, Scene};
+use hr_scene::{Camera, Film, Image, Pixel, Scene};
 use rayon::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
@@ -42,6 +44,8 @@ const MOST_SURVIVAL: f32 = 0.95;
 const LEAST_ALBEDO: f32 = 0.05;
 /// Emitters among which one is picked at each point of a path.
 const CANDIDATES: u32 = 4;
+/// Of so many emitters each is looked at for what is in narrow lobes.
+const FEW: usize = 16;
 /// Step from one candidate's place on its emitter to the next one's: the two-dimensional golden ratio, as in
 /// [`hr_diffuse::sampling`].
 const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
@@ -97,9 +101,34 @@ impl Ray<'_> {
     }
 }
 
-/// Where paths end: told what a ray met, it gives the radiance that is reflected there back along the ray (W/(m² sr),
-/// without what is emitted), or nothing where the path is to go on.
-pub type End<'a> = dyn Fn(&Ray<'_>) -> Option<Rgb> + Sync + 'a;
+/// What somebody knows already about the light of the scene.
+pub trait Known: Sync {
+    /// Where a path ends: the radiance that is reflected back along a ray from what it met (W/(m² sr), without what is
+    /// emitted), or nothing where the path is to go on.
+    fn end(&self, ray: &Ray<'_>) -> Option<Rgb>;
+
+    /// Which emitters light what was hit, if that is known.
+    fn nearby(&self, hit: &Hit) -> Option<&Nearby>;
+
+    /// Whether what was hit is one of the [glowing](Emitters::glowing) emitters, and which one. Rays that meet it without density
+    /// must [end](Self::end) there.
+    fn glowing(&self, hit: &Hit) -> Option<u32>;
+}
+
+/// Nothing is known.
+impl Known for () {
+    fn end(&self, _: &Ray<'_>) -> Option<Rgb> {
+        None
+    }
+
+    fn nearby(&self, _: &Hit) -> Option<&Nearby> {
+        None
+    }
+
+    fn glowing(&self, _: &Hit) -> Option<u32> {
+        None
+    }
+}
 
 /// A point that reflects.
 struct Point {
@@ -108,7 +137,7 @@ struct Point {
     /// True unit normal on the side that was hit.
     true_normal: Vec3,
     /// Shading frame on that side.
-    place: Place,
+    place: Frame,
     /// Back along the path, in the frame.
     outgoing: Vec3,
     reflector: Arc<dyn Reflector>,
@@ -148,8 +177,15 @@ impl<'a> PathTracer<'a> {
     /// Prepares a scene; `visibility` is that of its surfaces, as [`visibility`] or a solution has it.
     #[must_use]
     pub fn new(scene: &'a Scene, visibility: &'a Visibility) -> Self {
+        Self::with_glow(scene, visibility, &[])
+    }
+
+    /// The same where parts of surfaces glow, so that light is drawn from them, too: somebody who [knows](Known) must tell
+    /// their light.
+    #[must_use]
+    pub fn with_glow(scene: &'a Scene, visibility: &'a Visibility, glowing: &[Glow]) -> Self {
         let normalization = Normalization::new(&scene.surfaces);
-        let emitters = Emitters::new(scene, visibility.geometries(), &normalization, CANDIDATES);
+        let emitters = Emitters::new(scene, visibility.geometries(), &normalization, CANDIDATES, glowing);
         let albedo = |reflector: &Arc<dyn Reflector>| {
             if reflector.is_diffuse() { 0.0 } else { reflector.glossy_albedo().max_element().max(LEAST_ALBEDO) }
         };
@@ -157,23 +193,30 @@ impl<'a> PathTracer<'a> {
         Self { scene, visibility, normalization, emitters, albedos }
     }
 
+    /// What light is drawn from.
+    #[must_use]
+    pub fn emitters(&self) -> &Emitters {
+        &self.emitters
+    }
+
     /// The image that a camera takes with `paths` paths per pixel (at least one). The same seed gives the same image,
     /// for any number of threads; others give independent ones. `watch` is told the share that is done.
     #[must_use]
     pub fn render(&self, camera: &Camera, paths: u32, seed: u32, watch: &(dyn Fn(f32) + Sync)) -> Reference {
-        self.render_until(&|_| None, camera, paths, seed, watch)
+        let (film, sigma) = self.render_until(&(), camera, paths, seed, watch);
+        Reference { image: film.image, sigma }
     }
 
-    /// [`render`](Self::render) by paths that [end](End).
+    /// [`render`](Self::render) by paths that end where the light is [known](Known), on film, with its standard error.
     #[must_use]
     pub fn render_until(
         &self,
-        end: &End<'_>,
+        known: &dyn Known,
         camera: &Camera,
         paths: u32,
         seed: u32,
         watch: &(dyn Fn(f32) + Sync),
-    ) -> Reference {
+    ) -> (Film, Image) {
         let paths = paths.max(1);
         let mut image = Image::new(camera.width, camera.height);
         let mut sigma = image.clone();
@@ -182,26 +225,32 @@ impl<'a> PathTracer<'a> {
         let view = View::new(camera);
         let done = AtomicU32::new(0);
         let rows = image.pixels.par_chunks_mut(width).zip(sigma.pixels.par_chunks_mut(width));
-        rows.enumerate().for_each(|(y, (row, sigmas))| {
-            for (x, (pixel, sigma)) in row.iter_mut().zip(sigmas).enumerate() {
+        let edges = rows.enumerate().flat_map_iter(|(y, (row, sigmas))| {
+            let mut edges = Vec::new();
+            for (x, (mean, sigma)) in row.iter_mut().zip(sigmas).enumerate() {
                 let seed = hash(hash(x as u32, y as u32), seed);
-                let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+                let (mut pixel, mut squares) = (Pixel::default(), DVec3::ZERO);
                 for index in 0..paths {
                     let sampler = Sampler::new(seed, index);
                     let direction = view.direction(Vec2::new(x as f32, y as f32), sampler.pair(0));
-                    let radiance = self.path(eye, direction, &sampler, end).as_dvec3();
-                    sum += radiance;
-                    squares += radiance * radiance;
+                    let (surface, radiance) = self.seen(eye, direction, &sampler, known);
+                    pixel.add(surface, radiance);
+                    squares += radiance.as_dvec3() * radiance.as_dvec3();
                 }
                 let n = f64::from(paths);
-                let mean = sum / n;
-                let variance = (squares / n - mean * mean).max(DVec3::ZERO) / (n - 1.0).max(1.0);
-                (*pixel, *sigma) = (mean.as_vec3(), variance.map(f64::sqrt).as_vec3());
+                *mean = pixel.radiance();
+                let variance = (squares / n - mean.as_dvec3() * mean.as_dvec3()).max(DVec3::ZERO) / (n - 1.0).max(1.0);
+                *sigma = variance.map(f64::sqrt).as_vec3();
+                if pixel.has_edge(0.0) {
+                    edges.push((y * width + x, pixel));
+                }
             }
             let rows = done.fetch_add(1, Ordering::Relaxed) + 1;
             watch(rows as f32 / camera.height as f32);
+            edges
         });
-        Reference { image, sigma }
+        let edges = edges.collect();
+        (Film::new(image, edges), sigma)
     }
 
     /// What a camera sees of the emitters themselves: their own radiance, without any reflection.
@@ -226,24 +275,34 @@ impl<'a> PathTracer<'a> {
 
     /// Radiance that arrives at `origin` (unit space) against the unit `direction`, by one path.
     #[must_use]
-    pub fn path(&self, mut origin: Vec3, mut direction: Vec3, sampler: &Sampler, end: &End<'_>) -> Rgb {
-        let (mut light, mut throughput) = (Rgb::ZERO, Rgb::ONE);
-        let (mut own, mut density) = (NO_BLOCKER, f32::INFINITY);
+    pub fn path(&self, origin: Vec3, direction: Vec3, sampler: &Sampler) -> Rgb {
+        self.seen(origin, direction, sampler, &()).1
+    }
+
+    /// The same with the surface that the path meets first.
+    fn seen(&self, mut origin: Vec3, mut direction: Vec3, sampler: &Sampler, known: &dyn Known) -> (Option<u32>, Rgb) {
+        let (mut light, mut throughput, mut first) = (Rgb::ZERO, Rgb::ONE, None);
+        let (mut own, mut density, mut nearby) = (NO_BLOCKER, f32::INFINITY, None);
         for bounce in 0.. {
             let Some(hit) = self.visibility.closest_except(origin, direction, START, f32::MAX, own) else { break };
+            first = first.or(Some(hit.surface));
             let emitted = self.emitted(&hit);
             if emitted != Rgb::ZERO {
-                let other = self.emitters.density(hit.surface, hit.t, -hit.normal.dot(direction));
-                light += throughput * emitted * power_heuristic(density, other);
+                light += throughput * emitted * self.share_of_emission(&hit, direction, density, nearby.into());
             }
-            if let Some(reflected) = end(&Ray { hit: &hit, direction, density, bounce }) {
+            if let Some(entry) = known.glowing(&hit) {
+                let other = self.emitters.density(entry, hit.t, hit.normal.dot(direction).abs(), nearby.into());
+                throughput *= power_heuristic(density, other);
+            }
+            if let Some(reflected) = known.end(&Ray { hit: &hit, direction, density, bounce }) {
                 light += throughput * reflected;
                 break;
             }
             let Some(point) = self.point(&hit, direction) else { break };
             let pair = |i: u32| sampler.pair(1 + bounce * PAIRS + i);
             let (choices, place, turn, chance) = (pair(0), pair(1), pair(2), pair(3));
-            light += throughput * self.direct(&point, choices.x, place, chance.x);
+            nearby = known.nearby(&hit);
+            light += throughput * self.direct(&point, [choices.x, chance.x], place, known, nearby, bounce);
             let Some(step) = point.step(choices.y, turn) else { break };
             throughput *= step.weight;
             if bounce + 1 >= SURE_BOUNCES {
@@ -256,11 +315,11 @@ impl<'a> PathTracer<'a> {
             }
             (origin, direction, own, density) = (point.position, step.direction, point.surface, step.density);
         }
-        light
+        (first, light)
     }
 
     /// Radiance that the glossy part of a surface's BRDF reflects back against the unit `direction` where it was hit: the light
-    /// of one emitter, drawn by a pair of random numbers each for which and where, and the mean along rays within the lobe, drawn
+    /// of emitters, drawn by a pair of random numbers each for which and where, and the mean along rays within the lobe, drawn
     /// by one pair each, of what is emitted where they end, and what is reflected there, as `beyond` tells. Whichever way
     /// finds an emitter rarely counts for little (multiple importance sampling).
     pub fn glossy(
@@ -273,16 +332,25 @@ impl<'a> PathTracer<'a> {
     ) -> Rgb {
         let Some(point) = self.point(hit, direction) else { return Rgb::ZERO };
         let point = Point { diffuse: Rgb::ZERO, chances: [0.0, 1.0, 0.0], ..point };
-        let mut light = self.direct(&point, choice.x, place, choice.y);
+        let (draws, mut light) = if self.emitters.len() <= FEW {
+            (Draws::Each, self.direct_of_each(&point, choice.x, place))
+        } else {
+            (Draws::ByPower, self.direct(&point, [choice.x, choice.y], place, &(), None, 0))
+        };
         for turn in turns {
             let Some(step) = point.step(0.0, *turn) else { continue };
             let met = self.visibility.closest_except(point.position, step.direction, START, f32::MAX, point.surface);
             let Some(met) = met else { continue };
-            let other = self.emitters.density(met.surface, met.t, -met.normal.dot(step.direction));
-            let emitted = self.emitted(&met) * power_heuristic(step.density, other);
+            let emitted = self.emitted(&met) * self.share_of_emission(&met, step.direction, step.density, draws);
             light += step.weight * (emitted + beyond(&met, step.direction)) / turns.len() as f32;
         }
         light
+    }
+
+    /// What of an emitter's light counts for a ray of some density that met it; the rest is that of draws.
+    fn share_of_emission(&self, hit: &Hit, direction: Vec3, density: f32, draws: Draws<'_>) -> f32 {
+        let Some(entry) = self.emitters.of_surface(hit.surface) else { return 1.0 };
+        power_heuristic(density, self.emitters.density(entry, hit.t, -hit.normal.dot(direction), draws))
     }
 
     /// Radiance that a surface emits where it was hit.
@@ -316,7 +384,7 @@ impl<'a> PathTracer<'a> {
         let true_normal = hit.normal * side;
         // Without shading normals the true one is right also at grazing directions.
         let flat = self.scene.surfaces[hit.surface as usize].shading_normals.is_none();
-        let place = Place::along(hit.point, if flat { true_normal } else { normal }, reflector.grain());
+        let place = Frame::along(hit.point, if flat { true_normal } else { normal }, reflector.grain());
         Some(Point {
             position: hit.point,
             surface: hit.surface,
@@ -339,17 +407,25 @@ impl<'a> PathTracer<'a> {
     }
 
     /// Radiance that a point reflects of the light of one emitter. It is picked from a few candidates by what they
-    /// would send were nothing between, so that near lamps win over strong ones (Talbot, Cline, Egbert, "Importance
-    /// Resampling for Global Illumination", EGSR 2005); the candidates are stratified by power.
-    fn direct(&self, point: &Point, choice: f32, place: Vec2, pick: f32) -> Rgb {
+    /// would send with what is known of their visibility, so that near lamps win over strong ones (Talbot, Cline, Egbert, "Importance
+    /// Resampling for Global Illumination", EGSR 2005); the candidates are stratified by power, or by what is known of
+    /// the emitters `nearby`.
+    fn direct(
+        &self,
+        point: &Point,
+        [choice, mut pick]: [f32; 2],
+        place: Vec2,
+        known: &dyn Known,
+        nearby: Option<&Nearby>,
+        bounce: u32,
+    ) -> Rgb {
         let geometries = self.visibility.geometries();
         let (mut best, mut total) = (None, 0.0);
-        let mut pick = pick;
         for i in 0..CANDIDATES {
             let (choice, place) = ((choice + i as f32) / CANDIDATES as f32, (place + STEP * i as f32).fract());
-            let Some(arrival) = self.emitters.draw(geometries, point.position, choice, place) else { continue };
+            let Some(arrival) = self.emitters.draw(geometries, point.position, choice, place, nearby) else { continue };
             let light = point.reflected(&arrival) * arrival.irradiance;
-            let strength = light.abs().element_sum();
+            let strength = light.abs().element_sum() * arrival.seen;
             if strength > 0.0 {
                 // One of several in one pass: the new one replaces the old one by its share of the sum so far, and what
                 // is left of the random number serves the next.
@@ -364,9 +440,44 @@ impl<'a> PathTracer<'a> {
             }
         }
         let Some((arrival, light)) = best else { return Rgb::ZERO };
+        let light = light * (total / CANDIDATES as f32);
+        if let Some((entry, believed)) = arrival.glow {
+            let (origin, direction) = (point.position, arrival.direction);
+            let met = self.visibility.closest_except(origin, direction, START, f32::MAX, point.surface);
+            let Some(hit) = met.filter(|hit| known.glowing(hit) == Some(entry)) else { return Rgb::ZERO };
+            let found = known.end(&Ray { hit: &hit, direction, density: 0.0, bounce: bounce + 1 });
+            return found.map_or(Rgb::ZERO, |found| light * found / believed);
+        }
         let ends = [point.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
         let blocked = self.visibility.occluded(point.position, arrival.from, ends, &mut { NO_BLOCKER });
-        if blocked { Rgb::ZERO } else { light * (total / CANDIDATES as f32) }
+        if blocked { Rgb::ZERO } else { light }
+    }
+
+    /// Radiance that a point reflects of the light of each emitter, where these are few. The strongest few are looked at, were
+    /// nothing between, of the others one here and there.
+    fn direct_of_each(&self, point: &Point, choice: f32, place: Vec2) -> Rgb {
+        let geometries = self.visibility.geometries();
+        let mut lights = [None; FEW];
+        for (entry, slot) in (0..self.emitters.len() as u32).zip(&mut lights) {
+            let place = (place + STEP * entry as f32).fract();
+            let Some(arrival) = self.emitters.shine(geometries, point.position, entry, place, 1.0) else { continue };
+            let light = point.reflected(&arrival) * arrival.irradiance;
+            let strength = light.abs().element_sum();
+            *slot = (strength > 0.0).then_some((arrival, light, strength));
+        }
+        let total: f32 = lights.iter().flatten().map(|(_, _, strength)| strength).sum();
+        let mut sum = Rgb::ZERO;
+        for (number, (arrival, light, strength)) in lights.iter().flatten().enumerate() {
+            let chance = (CANDIDATES as f32 * strength / total).min(1.0);
+            if (choice + STEP.x * number as f32).fract() >= chance {
+                continue;
+            }
+            let ends = [point.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
+            if !self.visibility.occluded(point.position, arrival.from, ends, &mut { NO_BLOCKER }) {
+                sum += light / chance;
+            }
+        }
+        sum
     }
 }
 

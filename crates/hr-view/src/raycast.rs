@@ -5,27 +5,43 @@
 //! a [path tracer](crate::path_tracer) end where they meet the solution, whose elements and mistakes are then seen blurred.
 
 use crate::glossy::{self, FOLLOWED, Mode, NARROWEST};
-use crate::path_tracer::{PathTracer, Ray};
+use crate::path_tracer::{Glow, Known, Nearby, PathTracer, Place as Lit, Ray, Sampler};
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::haar::Haar;
 use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
-use hr_diffuse::sampling::{hash, point2, unit};
-use hr_diffuse::{Hit, NodeId, Rgb, Solution};
-use hr_scene::{Camera, Image, Material, Scene};
+use hr_diffuse::sampling::{hash, point2};
+use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
+use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Rays that follow a narrow lobe, per ray of the pixel.
 const LOBE_RAYS: usize = 6;
 /// Mirrors in mirrors end here.
 const MOST_BOUNCES: u32 = 4;
-/// Paths of a final gather, for every ray of the other modes. With the grid of stills 63 per pixel, 4032 per 8 × 8 block:
-/// noise of a block's mean is 1 % where many lamps light rough and polished metal, else less.
+/// Where surfaces meet in a pixel and differ by more than this share, so many times as many more rays tell for a print how much is
+/// seen of each.
+const EDGE: f32 = 0.05;
+const EDGE_ROUNDS: u8 = 3;
+/// Where the standard error of a pixel is larger than this share of its light, there are as many more rays for a print as would
+/// make it that small, up to so many times as many. Its neighbours have as many, as some do not know how noisy they are.
+const NOISE: f32 = 0.04;
+const NOISE_ROUNDS: u8 = 7;
+/// Paths of a final gather, for every ray of the other modes, then as many more as make a power of two, which are spread best. With
+/// the grid of stills 64 per pixel, 4096 per 8 × 8 block: noise of a block's mean is 1 % where many lamps light rough and
+/// polished metal, else less.
 const GATHERED: u32 = 7;
 /// A path ends where a ray stands for at least so many times the leaf that it meets; else one would see the elements.
 const WIDE: f32 = 16.0;
+/// Parts of surfaces glow that reflect more than so many times the mean radiance, as shades around bulbs do: rays that happen to meet
+/// them would be noise, so light is drawn from them. Of these, those with most power.
+const GLOWING: f32 = 4.0;
+const MOST_GLOWING: usize = 1024;
+/// The darkest leaf of a part that glows has at least this share of the light of the brightest.
+const EVEN: f32 = 0.3;
 /// Rays start this far from their surface (unit space): what rounding needs.
 const START: f32 = 1e-6;
 
@@ -39,6 +55,10 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     grid: u32,
     /// For final gathers, and for what is in narrow lobes.
     tracer: PathTracer<'a>,
+    /// Nodes that glow, rising.
+    glowing: Vec<u32>,
+    /// For final gathers, by node, which emitters light it; found out of leaves where it is asked for.
+    nearby: Vec<OnceLock<Nearby>>,
 }
 
 /// A point that a ray met.
@@ -52,12 +72,34 @@ struct Met {
     reflector: Arc<dyn Reflector>,
 }
 
+/// Rounds of rays that a pixel should have more than all have.
+#[derive(Clone, Copy, Default)]
+struct Wanted {
+    at_edge: u8,
+    by_noise: u8,
+}
+
+impl Wanted {
+    fn by(pixel: &Pixel) -> Self {
+        let times = (pixel.noise() / NOISE).powi(2);
+        Self {
+            at_edge: if pixel.has_edge(EDGE) { EDGE_ROUNDS } else { 0 },
+            by_noise: (times.ceil() - 1.0).clamp(0.0, f32::from(NOISE_ROUNDS)) as u8,
+        }
+    }
+}
+
 impl<'a, B: Basis> RayCaster<'a, B> {
     /// For a scene and its solution.
     #[must_use]
     pub fn new(scene: &'a Scene, solution: &'a Solution<GlossyField<B>>, mode: Mode) -> Self {
-        let tracer = PathTracer::new(scene, &solution.scene.visibility);
-        Self { scene, solution, mode, grid: 3, tracer }
+        let glowing = if mode == Mode::Gather { glowing(scene, solution) } else { Vec::new() };
+        let glows: Vec<_> = glowing.iter().map(|&(node, light)| glow(solution, node, light)).collect();
+        let tracer = PathTracer::with_glow(scene, &solution.scene.visibility, &glows);
+        let nodes = if mode == Mode::Gather { solution.elements.nodes.len() } else { 0 };
+        let nearby = std::iter::repeat_with(OnceLock::new).take(nodes).collect();
+        let glowing = glowing.iter().map(|&(node, _)| node).collect();
+        Self { scene, solution, mode, grid: 3, tracer, glowing, nearby }
     }
 
     /// Rays per pixel, squared: 1…16. 3 by default. A final gather has more of them in proportion.
@@ -69,63 +111,99 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// The image that a camera takes: linear radiance, W/(m² sr). `watch` is told the share that is done.
     #[must_use]
     pub fn render(&self, camera: &Camera, watch: &(dyn Fn(f32) + Sync)) -> Image {
-        if self.mode == Mode::Gather {
-            return self
-                .tracer
-                .render_until(&|ray| self.end(ray), camera, self.grid * self.grid * GATHERED, 0, watch)
-                .image;
-        }
-        let mut image = Image::new(camera.width, camera.height);
-        let width = camera.width as usize;
-        let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
-        let done = std::sync::atomic::AtomicU32::new(0);
-        image.pixels.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-            let mut scratch = Vec::new();
-            for (x, pixel) in row.iter_mut().enumerate() {
-                let seed = hash(x as u32, y as u32 ^ 0x6b43);
-                let mut sum = Rgb::ZERO;
-                for i in 0..self.grid * self.grid {
-                    let cell = Vec2::new((i % self.grid) as f32, (i / self.grid) as f32);
-                    let within = (cell + point2(seed, i)) / self.grid as f32;
-                    let (px, py) = (x as f64 + f64::from(within.x), y as f64 + f64::from(within.y));
-                    let direction = camera.direction(px, py).as_vec3();
-                    sum += self.radiance(eye, direction, u32::MAX, 0, hash(seed, i), &mut scratch);
-                }
-                *pixel = sum / (self.grid * self.grid) as f32;
-            }
-            let rows = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-            watch(rows as f32 / camera.height as f32);
-        });
-        image
+        self.expose(camera, false, watch).image
     }
 
-    /// Radiance that arrives at `origin` (unit space) against `direction`.
-    fn radiance(
+    /// The same image, to be printed: edges between surfaces, and what is noisy, are known better. See [`hr_scene::film`].
+    #[must_use]
+    pub fn film(&self, camera: &Camera, watch: &(dyn Fn(f32) + Sync)) -> Film {
+        self.expose(camera, true, watch)
+    }
+
+    /// To be printed or not: rays that are more than others have do not enter the image.
+    fn expose(&self, camera: &Camera, printed: bool, watch: &(dyn Fn(f32) + Sync)) -> Film {
+        let rays = self.grid * self.grid;
+        if self.mode == Mode::Gather {
+            return self.tracer.render_until(self, camera, (rays * GATHERED).next_power_of_two(), 0, watch).0;
+        }
+        let mut image = Image::new(camera.width, camera.height);
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let mut wanted = vec![Wanted::default(); image.pixels.len()];
+        let done = AtomicU32::new(0);
+        let passes = if printed { 2 } else { 1 };
+        let tell = || {
+            let rows = done.fetch_add(1, Ordering::Relaxed) + 1;
+            watch(rows as f32 / (passes * camera.height) as f32);
+        };
+        let rows = image.pixels.par_chunks_mut(width).zip(wanted.par_chunks_mut(width));
+        rows.enumerate().for_each(|(y, (row, wanted))| {
+            let mut scratch = Vec::new();
+            for (x, (mean, wanted)) in row.iter_mut().zip(wanted).enumerate() {
+                let pixel = self.pixel(camera, x, y, 0, &mut scratch);
+                (*mean, *wanted) = (pixel.radiance(), Wanted::by(&pixel));
+            }
+            tell();
+        });
+        let rows = if printed { height } else { 0 };
+        let more = (0..rows).into_par_iter().flat_map_iter(|y| {
+            let (wanted, tell) = (&wanted, &tell);
+            let mut scratch = Vec::new();
+            let row = move |x: usize| {
+                let around = || {
+                    (y.saturating_sub(1)..height.min(y + 2))
+                        .flat_map(|y| (x.saturating_sub(1)..width.min(x + 2)).map(move |x| y * width + x))
+                };
+                let noise = around().map(|i| wanted[i].by_noise).max().unwrap_or(0);
+                let rounds = noise.max(wanted[y * width + x].at_edge);
+                if x + 1 == width {
+                    tell();
+                }
+                (rounds > 0).then(|| (y * width + x, self.pixel(camera, x, y, u32::from(rounds), &mut scratch)))
+            };
+            (0..width).filter_map(row)
+        });
+        let more = more.collect();
+        Film::new(image, more)
+    }
+
+    /// What is seen in a pixel with some rounds of rays more than all have.
+    fn pixel(&self, camera: &Camera, x: usize, y: usize, rounds: u32, scratch: &mut Vec<Incident>) -> Pixel {
+        let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
+        let (rays, seed) = (self.grid * self.grid, hash(x as u32, y as u32 ^ 0x6b43));
+        let mut pixel = Pixel::default();
+        for i in 0..rays * (1 + rounds) {
+            let sampler = Sampler::new(seed, i);
+            let within = if i < rays {
+                let cell = Vec2::new((i % self.grid) as f32, (i / self.grid) as f32);
+                (cell + point2(seed, i)) / self.grid as f32
+            } else {
+                sampler.pair(0)
+            };
+            let (px, py) = (x as f64 + f64::from(within.x), y as f64 + f64::from(within.y));
+            let direction = camera.direction(px, py).as_vec3();
+            let (surface, light) = self.seen(eye, direction, u32::MAX, 0, &sampler, scratch);
+            pixel.add(surface, light);
+        }
+        pixel
+    }
+
+    /// The surface that is seen from `origin` (unit space) in `direction`, and the radiance that arrives.
+    fn seen(
         &self,
         origin: Vec3,
         direction: Vec3,
         own: u32,
         bounce: u32,
-        seed: u32,
+        sampler: &Sampler,
         scratch: &mut Vec<Incident>,
-    ) -> Rgb {
+    ) -> (Option<u32>, Rgb) {
         let visibility = &self.solution.scene.visibility;
-        let Some(hit) = visibility.closest_except(origin, direction, START, f32::MAX, own) else { return Rgb::ZERO };
+        let hit = visibility.closest_except(origin, direction, START, f32::MAX, own);
+        let Some(hit) = hit else { return (None, Rgb::ZERO) };
         let emitted = if hit.front { self.material(&hit).exitance * FRAC_1_PI } else { Rgb::ZERO };
-        let Some(leaf) = self.solution.leaf(&hit) else { return emitted };
-        emitted + self.leaving(hit, leaf, direction, bounce, seed, scratch)
-    }
-
-    /// Where a path of a final gather ends, and what is reflected there. Mirrors are followed, and so are rays from too
-    /// near or in too narrow a lobe, as long as there are not too many.
-    fn end(&self, ray: &Ray<'_>) -> Option<Rgb> {
-        let Some(leaf) = self.solution.leaf(ray.hit) else { return Some(Rgb::ZERO) };
-        let follows = ray.footprint() < WIDE * self.solution.elements.nodes[leaf.index()].area
-            || self.material(ray.hit).reflector.mirror() != Rgb::ZERO;
-        if follows && ray.bounce < MOST_BOUNCES {
-            return None;
-        }
-        Some(self.leaving(*ray.hit, leaf, ray.direction, ray.bounce.max(1), 0, &mut Vec::new()))
+        let leaf = self.solution.leaf(&hit);
+        let reflected = leaf.map(|leaf| self.leaving(hit, leaf, direction, bounce, sampler, scratch));
+        (Some(hit.surface), emitted + reflected.unwrap_or(Rgb::ZERO))
     }
 
     fn material(&self, hit: &Hit) -> &'a Material {
@@ -139,7 +217,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         leaf: NodeId,
         direction: Vec3,
         bounce: u32,
-        seed: u32,
+        sampler: &Sampler,
         scratch: &mut Vec<Incident>,
     ) -> Rgb {
         let material = self.material(&hit);
@@ -164,7 +242,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let mirrors = met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES;
         let glossy = match self.mode {
             Mode::Distributions => self.interpolated(&met),
-            Mode::Samples if bounce == 0 || mirrors => self.reflected(&met, bounce, seed, scratch),
+            Mode::Samples if bounce == 0 || mirrors => self.reflected(&met, bounce, sampler, scratch),
             Mode::Samples | Mode::Gather if faint != Rgb::ZERO => faint * irradiance * FRAC_1_PI,
             // Of leaves whose light no link asked for there is no distribution.
             Mode::Samples | Mode::Gather if self.solution.reflected[leaf.index()].is_empty() => {
@@ -183,30 +261,26 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     }
 
     /// Glossy radiance from the samples that arrive at the point, or along rays where the lobe is narrow.
-    fn reflected(&self, met: &Met, bounce: u32, seed: u32, scratch: &mut Vec<Incident>) -> Rgb {
+    fn reflected(&self, met: &Met, bounce: u32, sampler: &Sampler, scratch: &mut Vec<Incident>) -> Rgb {
         let place = Place::along(met.hit.point, met.normal, met.reflector.grain());
         let outgoing = place.local(met.away);
         let mirror = met.reflector.mirror();
         let mut light = Rgb::ZERO;
         if mirror != Rgb::ZERO {
             let direction = met.normal * (2.0 * met.normal.dot(met.away)) - met.away;
-            light += mirror * self.along(met, direction, bounce, hash(seed, 11), scratch);
+            light += mirror * self.along(met, direction, bounce, &sampler.apart(0), scratch);
         }
         if met.reflector.glossy_albedo() == Rgb::ZERO {
             return light;
         }
         if met.reflector.lobe(outgoing).width < FOLLOWED {
-            let turn = unit(hash(seed, 12));
-            let turns: [Vec2; LOBE_RAYS] = std::array::from_fn(|i| {
-                let u = point2(hash(seed, 13), i as u32);
-                Vec2::new((u.x + turn).fract(), (u.y + i as f32) / LOBE_RAYS as f32).fract()
-            });
-            let pairs = [14, 15].map(|pair| point2(hash(seed, pair), 0));
+            let turns: [Vec2; LOBE_RAYS] = std::array::from_fn(|k| sampler.split(LOBE_RAYS as u32, k as u32).pair(1));
+            let pairs = [2, 3].map(|dimension| sampler.pair(dimension));
             let mut number = 0;
             let mut beyond = |hit: &Hit, direction| {
                 number += 1;
                 let Some(leaf) = self.solution.leaf(hit) else { return Rgb::ZERO };
-                self.leaving(*hit, leaf, direction, bounce + 1, hash(seed, 15 + number), scratch)
+                self.leaving(*hit, leaf, direction, bounce + 1, &sampler.apart(number), scratch)
             };
             return light + self.tracer.glossy(&met.hit, -met.away, pairs, &turns, &mut beyond);
         }
@@ -214,11 +288,104 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     }
 
     /// What is seen from a point along a direction; nothing below the surface.
-    fn along(&self, met: &Met, direction: Vec3, bounce: u32, seed: u32, scratch: &mut Vec<Incident>) -> Rgb {
+    fn along(&self, met: &Met, direction: Vec3, bounce: u32, sampler: &Sampler, scratch: &mut Vec<Incident>) -> Rgb {
         let side = if met.hit.front { 1.0 } else { -1.0 };
         if direction.dot(met.hit.normal) * side <= 0.0 {
             return Rgb::ZERO;
         }
-        self.radiance(met.hit.point, direction, met.hit.surface, bounce + 1, seed, scratch)
+        self.seen(met.hit.point, direction, met.hit.surface, bounce + 1, sampler, scratch).1
+    }
+}
+
+impl<B: Basis> Known for RayCaster<'_, B> {
+    /// Mirrors are followed, and so are rays from too near or in too narrow a lobe, as long as there are not too many.
+    fn end(&self, ray: &Ray<'_>) -> Option<Rgb> {
+        let Some(leaf) = self.solution.leaf(ray.hit) else { return Some(Rgb::ZERO) };
+        let follows = ray.footprint() < WIDE * self.solution.elements.nodes[leaf.index()].area
+            || self.material(ray.hit).reflector.mirror() != Rgb::ZERO;
+        if follows && ray.bounce < MOST_BOUNCES {
+            return None;
+        }
+        Some(self.leaving(*ray.hit, leaf, ray.direction, ray.bounce.max(1), &Sampler::new(0, 0), &mut Vec::new()))
+    }
+
+    fn nearby(&self, hit: &Hit) -> Option<&Nearby> {
+        let leaf = self.solution.leaf(hit)?;
+        Some(self.nearby.get(leaf.index())?.get_or_init(|| {
+            let element = &self.solution.elements.nodes[leaf.index()];
+            let place = Lit { surface: element.source, domain: element.domain, back: element.kind == Kind::Back };
+            Nearby::new(self.tracer.emitters(), &self.solution.scene.visibility, &place, leaf.0)
+        }))
+    }
+
+    fn glowing(&self, hit: &Hit) -> Option<u32> {
+        let leaf = self.solution.leaf(hit).filter(|_| !self.glowing.is_empty())?;
+        // One of them may be above the leaf.
+        let mut node = leaf;
+        loop {
+            if let Ok(place) = self.glowing.binary_search(&node.0) {
+                return Some(self.tracer.emitters().glowing(place));
+            }
+            node =
+                self.solution.elements.parent(node).filter(|up| self.solution.elements.nodes[up.index()].is_patch())?;
+        }
+    }
+}
+
+/// Parts of surfaces that reflect much more than others, rising, with their radiance, the mean of the channels: as large as they are
+/// about equally bright. Mirrors are none: they are followed.
+fn glowing<B: Basis>(scene: &Scene, solution: &Solution<GlossyField<B>>) -> Vec<(u32, f32)> {
+    let nodes = &solution.elements.nodes;
+    let radiance = |node: u32| {
+        let element = &nodes[node as usize];
+        let diffuse = element.reflectance * solution.exitant.irradiance[node as usize];
+        (diffuse + solution.exitant.directional[node as usize]).element_sum() * FRAC_1_PI / 3.0
+    };
+    let (mut light, mut area) = (0.0, 0.0);
+    for leaf in solution.elements.patch_leaves() {
+        let part = f64::from(nodes[leaf as usize].area);
+        (light, area) = (light + f64::from(radiance(leaf)) * part, area + part);
+    }
+    let least = GLOWING * (light / area) as f32;
+    let is_mirror = |node: u32| scene.materials[nodes[node as usize].material as usize].reflector.mirror() != Rgb::ZERO;
+    // Darkest and brightest leaf of each node.
+    let mut ranges = vec![[f32::INFINITY, 0.0_f32]; nodes.len()];
+    for leaf in solution.elements.patch_leaves() {
+        ranges[leaf as usize] = [radiance(leaf); 2];
+    }
+    for node in (1..nodes.len()).rev() {
+        let [low, high] = ranges[node];
+        let parent = &mut ranges[nodes[node].parent as usize];
+        *parent = [parent[0].min(low), parent[1].max(high)];
+    }
+    let mut found = Vec::new();
+    let mut open = vec![0];
+    while let Some(node) = open.pop() {
+        let (element, [low, high]) = (&nodes[node as usize], ranges[node as usize]);
+        let is_bright = high > least && high.is_finite();
+        if is_bright && element.is_patch() && low >= EVEN * high {
+            if !is_mirror(node) {
+                found.push((node, radiance(node)));
+            }
+        } else if is_bright {
+            open.extend(element.first_child..element.first_child + element.child_count);
+        }
+    }
+    let power = |&(node, light): &(u32, f32)| light * nodes[node as usize].area;
+    found.sort_by(|a, b| power(b).total_cmp(&power(a)));
+    found.truncate(MOST_GLOWING);
+    found.sort_unstable_by_key(|&(node, _)| node);
+    found
+}
+
+/// A node as an emitter.
+fn glow<B: Basis>(solution: &Solution<GlossyField<B>>, node: u32, light: f32) -> Glow {
+    let element = &solution.elements.nodes[node as usize];
+    Glow {
+        surface: element.source,
+        domain: element.domain,
+        back: element.kind == Kind::Back,
+        radiance: Rgb::splat(light),
+        area: element.area,
     }
 }

@@ -216,10 +216,10 @@ fn the_device_draws_what_the_ray_caster_sees() {
     let walkthrough = Walkthrough::new(Arc::clone(&solved), Mode::Distributions);
     let scene = &solved.scene;
     let camera = Camera { width: 120, height: 120, ..scene.default_camera() };
-    let image = RayCaster::new(scene, &solved.solution, Mode::Distributions).render(&camera, &|_| ());
+    let film = RayCaster::new(scene, &solved.solution, Mode::Distributions).film(&camera, &|_| ());
     let tone_map = ToneMap::default();
     let mut tone = hr_view::window::Tone::for_mesh(walkthrough.mesh());
-    tone.exposure = tone_map.factor(&image.pixels, scene.primaries);
+    tone.exposure = tone_map.factor(&film.image.pixels, scene.primaries);
     let picture = match Snapshot::of(&walkthrough, &camera, Some(&tone)) {
         Ok(picture) => picture,
         Err(WindowError::NoAdapter(reason)) => {
@@ -228,7 +228,7 @@ fn the_device_draws_what_the_ray_caster_sees() {
         }
         Err(error) => panic!("{error}"),
     };
-    let expected = image.to_srgb8(&tone_map, scene.primaries);
+    let expected = film.to_srgb8(&tone_map, scene.primaries);
     let mut far = 0;
     for (expected, found) in expected.chunks_exact(3).zip(picture.rgba.chunks_exact(4)) {
         far += u32::from((0..3).any(|c| expected[c].abs_diff(found[c]) > 12));

@@ -1,10 +1,12 @@
-//! All that emits, to draw a light from: surfaces by their power, and lights without extent.
+//! All that light is drawn from: surfaces that emit, by their power, lights without extent, and, where a solution knows
+//! them, parts of surfaces that reflect so much that rays which meet them by chance would be noise.
 
+use super::nearby::Nearby;
 use glam::{Vec2, Vec3};
 use hr_diffuse::oracle::spot_ramp;
-use hr_diffuse::{Domain, Geometry, Light, LightKind, Normalization, Rgb};
+use hr_diffuse::{Domain, Geometry, Light, LightKind, Normalization, Rgb, Shape, Surface};
 use hr_scene::Scene;
-use std::f32::consts::{FRAC_1_PI, PI};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Farther than anything in the unit cube is from anything else in it.
 const FAR: f32 = 2.0;
@@ -17,24 +19,60 @@ pub struct Emitters {
     chances: Vec<f32>,
     /// Entry of each surface that emits, [`u32::MAX`] for the others.
     entry_of: Vec<u32>,
+    /// The first entry that is a part of a surface that reflects.
+    glowing: usize,
+    /// How many are drawn at a time.
+    candidates: u32,
 }
 
 /// One thing that emits.
 #[derive(Clone, Debug)]
 struct Entry {
     source: Source,
-    /// Chance to be drawn.
+    /// Chance to be drawn by power alone.
     chance: f32,
-    /// Chance to be among the candidates, about.
-    presence: f32,
 }
 
 #[derive(Clone, Debug)]
 enum Source {
-    /// A surface: exitant radiance of its front and area.
-    Surface { surface: u32, radiance: Rgb, area: f32 },
+    /// One side of a part of a surface.
+    Surface(Glow),
+    /// The outside of a whole sphere.
+    Sphere { surface: u32, center: Vec3, radius: f32, radiance: Rgb },
     /// A light without extent, its position and intensity in unit space.
     Light { light: Light, position: Vec3 },
+}
+
+/// One side of a part of a surface that shines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Glow {
+    /// The surface.
+    pub surface: u32,
+    /// The part of it.
+    pub domain: Domain,
+    /// Whether its back shines.
+    pub back: bool,
+    /// Exitant radiance, W/(m² sr); the same in each channel where it is only believed.
+    pub radiance: Rgb,
+    /// Area in unit space.
+    pub area: f32,
+}
+
+/// How emitters are drawn at a place.
+#[derive(Clone, Copy, Debug)]
+pub enum Draws<'a> {
+    /// By power alone.
+    ByPower,
+    /// By what is known of those nearby.
+    Nearby(&'a Nearby),
+    /// Each of them.
+    Each,
+}
+
+impl<'a> From<Option<&'a Nearby>> for Draws<'a> {
+    fn from(nearby: Option<&'a Nearby>) -> Self {
+        nearby.map_or(Self::ByPower, Self::Nearby)
+    }
 }
 
 /// Light that would arrive at a point if nothing were between.
@@ -44,6 +82,10 @@ pub struct Arrival {
     pub from: Vec3,
     /// The emitting surface, if it is one.
     pub surface: Option<u32>,
+    /// The emitter, and the radiance that it is believed to have in each channel, if it is a part of a surface that reflects.
+    pub glow: Option<(u32, f32)>,
+    /// Share of it that is believed to be seen, > 0; 1 where nothing is known.
+    pub seen: f32,
     /// Unit direction toward it.
     pub direction: Vec3,
     /// Irradiance on a plane perpendicular to `direction`, divided by the density it was drawn with.
@@ -53,15 +95,32 @@ pub struct Arrival {
 }
 
 impl Emitters {
-    /// Collects what emits. `geometries` are the scene's surfaces in unit space. `candidates` is how many are drawn at a
-    /// time, to pick the best of: it scales [`density`](Self::density).
+    /// Collects what emits, and what glows. `geometries` are the scene's surfaces in unit space. `candidates` is how many are
+    /// drawn at a time, to pick the best of: it scales [`density`](Self::density).
     #[must_use]
-    pub fn new(scene: &Scene, geometries: &[Geometry], normalization: &Normalization, candidates: u32) -> Self {
+    pub fn new(
+        scene: &Scene,
+        geometries: &[Geometry],
+        normalization: &Normalization,
+        candidates: u32,
+        glowing: &[Glow],
+    ) -> Self {
         let mut found = Vec::new();
         for (surface, geometry) in geometries.iter().enumerate() {
             let exitance = scene.materials[scene.surfaces[surface].material as usize].exitance;
             let area = geometry.area(Domain::WHOLE);
-            let source = Source::Surface { surface: surface as u32, radiance: exitance * FRAC_1_PI, area };
+            let (surface, radiance) = (surface as u32, exitance * FRAC_1_PI);
+            let source = match scene.surfaces[surface as usize] {
+                Surface { shape: Shape::Sphere { center, radius }, flip: false, .. } if radius > 0.0 => {
+                    Source::Sphere {
+                        surface,
+                        center: normalization.to_unit(center),
+                        radius: (radius * normalization.scale()) as f32,
+                        radiance,
+                    }
+                }
+                _ => Source::Surface(Glow { surface, domain: Domain::WHOLE, back: false, radiance, area }),
+            };
             found.push((source, exitance.element_sum() * area));
         }
         let scale2 = (normalization.scale() * normalization.scale()) as f32;
@@ -79,43 +138,133 @@ impl Emitters {
             ));
         }
         found.retain(|(_, power)| *power > 0.0);
+        let first = found.len();
+        let power = |glow: &Glow| glow.radiance.element_sum() * PI * glow.area;
+        found.extend(glowing.iter().map(|glow| (Source::Surface(*glow), power(glow))));
         let total: f32 = found.iter().map(|(_, power)| power).sum();
-        let mut emitters =
-            Self { entries: Vec::new(), chances: Vec::new(), entry_of: vec![u32::MAX; geometries.len()] };
-        let mut sum = 0.0;
-        for (source, power) in found {
-            if let Source::Surface { surface, .. } = source {
-                emitters.entry_of[surface as usize] = emitters.entries.len() as u32;
+        let (mut entries, mut chances, mut sum) = (Vec::new(), Vec::new(), 0.0);
+        let mut entry_of = vec![u32::MAX; geometries.len()];
+        for (index, (source, power)) in found.into_iter().enumerate() {
+            match source {
+                Source::Surface(Glow { surface, .. }) | Source::Sphere { surface, .. } if index < first => {
+                    entry_of[surface as usize] = index as u32;
+                }
+                _ => {}
             }
             let chance = power / total;
             sum += chance;
-            let presence = (chance * candidates as f32).min(1.0);
-            emitters.entries.push(Entry { source, chance, presence });
-            emitters.chances.push(sum);
+            entries.push(Entry { source, chance });
+            chances.push(sum);
         }
-        emitters
+        Self { entries, chances, entry_of, glowing: first, candidates }
     }
 
-    /// Draws light that may arrive at `at`: `choice` (0…1) picks the emitter, `u` the place on it. None where what was
-    /// drawn does not shine there.
+    /// How many there are.
     #[must_use]
-    pub fn draw(&self, geometries: &[Geometry], at: Vec3, choice: f32, u: Vec2) -> Option<Arrival> {
-        // Rounding may leave the last sum a little below the choice.
-        let index = self.chances.partition_point(|&sum| sum <= choice).min(self.entries.len().checked_sub(1)?);
-        let Entry { source, chance, presence } = &self.entries[index];
-        match source {
-            Source::Surface { surface, radiance, area } => {
-                let (from, normal, weight) = geometries[*surface as usize].sample_area(Domain::WHOLE, u.x, u.y);
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether nothing shines.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// The emitter that the part of a surface is that comes at this place among those that glow.
+    #[must_use]
+    pub fn glowing(&self, place: usize) -> u32 {
+        (self.glowing + place) as u32
+    }
+
+    /// Whether an emitter is one of these.
+    #[must_use]
+    pub fn is_glowing(&self, entry: u32) -> bool {
+        entry as usize >= self.glowing
+    }
+
+    /// The emitter that a surface is, if it emits.
+    #[must_use]
+    pub fn of_surface(&self, surface: u32) -> Option<u32> {
+        Some(self.entry_of[surface as usize]).filter(|&entry| entry != u32::MAX)
+    }
+
+    /// The chance of an entry to be drawn.
+    fn chance(&self, entry: u32, draws: Draws<'_>) -> f32 {
+        let by_power = self.entries[entry as usize].chance;
+        match draws {
+            Draws::ByPower => by_power,
+            Draws::Nearby(nearby) => nearby.chance(entry, by_power),
+            Draws::Each => 1.0,
+        }
+    }
+
+    /// Draws light that may arrive at `at`: `choice` (0…1) picks the emitter, by power or by what is known of those nearby,
+    /// `u` the place on it. None where what was drawn does not shine there.
+    #[must_use]
+    pub fn draw(
+        &self,
+        geometries: &[Geometry],
+        at: Vec3,
+        choice: f32,
+        u: Vec2,
+        nearby: Option<&Nearby>,
+    ) -> Option<Arrival> {
+        let by_power = |choice: f32| {
+            // Rounding may leave the last sum a little below the choice.
+            let index = self.chances.partition_point(|&sum| sum <= choice).min(self.entries.len().checked_sub(1)?);
+            Some(index as u32)
+        };
+        let Some(nearby) = nearby else {
+            let entry = by_power(choice)?;
+            return self.shine(geometries, at, entry, u, self.chance(entry, Draws::ByPower));
+        };
+        let entry = nearby.pick(choice).or_else(|rest| by_power(rest).ok_or(())).ok()?;
+        let arrival = self.shine(geometries, at, entry, u, self.chance(entry, Draws::Nearby(nearby)))?;
+        Some(Arrival { seen: nearby.seen(entry), ..arrival })
+    }
+
+    /// The light of one emitter that is drawn with a chance.
+    pub(super) fn shine(&self, geometries: &[Geometry], at: Vec3, entry: u32, u: Vec2, chance: f32) -> Option<Arrival> {
+        match &self.entries[entry as usize].source {
+            Source::Surface(glow) => {
+                let (from, front, weight) = geometries[glow.surface as usize].sample_area(glow.domain, u.x, u.y);
+                let normal = if glow.back { -front } else { front };
                 let to = from - at;
                 let distance2 = to.length_squared();
                 let direction = to / distance2.sqrt();
                 let cosine = -normal.dot(direction);
                 (distance2 > 0.0 && cosine > 0.0).then(|| Arrival {
                     from,
-                    surface: Some(*surface),
+                    surface: Some(glow.surface),
+                    glow: self.is_glowing(entry).then_some((entry, glow.radiance.x)),
+                    seen: 1.0,
                     direction,
-                    irradiance: *radiance * (cosine * weight / (distance2 * chance)),
-                    density: presence * distance2 / (area * cosine),
+                    irradiance: glow.radiance * (cosine * weight / (distance2 * chance)),
+                    density: self.presence(chance) * distance2 / (glow.area * cosine),
+                })
+            }
+            Source::Sphere { surface, center, radius, radiance } => {
+                // Evenly within the cone that it fills, so that no point faces away.
+                let to = center - at;
+                let distance2 = to.length_squared();
+                let narrowness = cap(distance2, *radius)?;
+                let cosine = 1.0 - u.x * narrowness;
+                let sine2 = (1.0 - cosine) * (1.0 + cosine);
+                let (axis, distance) = (to / distance2.sqrt(), distance2.sqrt());
+                let (right, up) = axis.any_orthonormal_pair();
+                let (sin, cos) = (TAU * u.y).sin_cos();
+                let direction = axis * cosine + (right * cos + up * sin) * sine2.sqrt();
+                let near = distance * cosine - (radius * radius - distance2 * sine2).max(0.0).sqrt();
+                let extent = TAU * narrowness;
+                Some(Arrival {
+                    from: at + direction * near,
+                    surface: Some(*surface),
+                    glow: None,
+                    seen: 1.0,
+                    direction,
+                    irradiance: *radiance * (extent / chance),
+                    density: self.presence(chance) / extent,
                 })
             }
             Source::Light { light, position } => {
@@ -133,6 +282,8 @@ impl Emitters {
                 (share > 0.0 && share.is_finite()).then(|| Arrival {
                     from,
                     surface: None,
+                    glow: None,
+                    seen: 1.0,
                     direction,
                     irradiance: light.intensity * (share / chance),
                     density: f32::INFINITY,
@@ -141,15 +292,29 @@ impl Emitters {
         }
     }
 
-    /// What stands for the density per solid angle with which [`draw`](Self::draw) finds a point of a surface's front,
-    /// seen at `distance` with the cosine `cosine` to its normal; 0 where the surface does not emit.
+    /// Chance to be among the candidates, about.
+    fn presence(&self, chance: f32) -> f32 {
+        (chance * self.candidates as f32).min(1.0)
+    }
+
+    /// What stands for the density per solid angle with which [`draw`](Self::draw) finds a point of an emitter's shining side
+    /// from a place, seen at `distance` with the cosine `cosine` to its normal.
     #[must_use]
-    pub fn density(&self, surface: u32, distance: f32, cosine: f32) -> f32 {
-        match self.entries.get(self.entry_of[surface as usize] as usize) {
-            Some(Entry { source: Source::Surface { area, .. }, presence, .. }) => {
-                presence * distance * distance / (area * cosine)
+    pub fn density(&self, entry: u32, distance: f32, cosine: f32, draws: Draws<'_>) -> f32 {
+        let presence = self.presence(self.chance(entry, draws));
+        match &self.entries[entry as usize].source {
+            Source::Surface(glow) => presence * distance * distance / (glow.area * cosine),
+            Source::Sphere { radius, .. } => {
+                let distance2 = distance * distance + radius * (radius + 2.0 * distance * cosine);
+                cap(distance2, *radius).map_or(0.0, |narrowness| presence / (TAU * narrowness))
             }
-            _ => 0.0,
+            Source::Light { .. } => 0.0,
         }
     }
+}
+
+/// 1 − cosine of half the angle that a sphere fills, seen from outside of it.
+fn cap(distance2: f32, radius: f32) -> Option<f32> {
+    let sine2 = radius * radius / distance2;
+    (sine2 < 1.0).then(|| sine2 / (1.0 + (1.0 - sine2).sqrt()))
 }

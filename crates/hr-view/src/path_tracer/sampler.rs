@@ -19,6 +19,18 @@ impl Sampler {
         Self { seed, index }
     }
 
+    /// Number `k` of `count` paths that go on from this one: all those of a pixel are spread evenly together.
+    #[must_use]
+    pub fn split(&self, count: u32, k: u32) -> Self {
+        Self { index: self.index * count + k, ..*self }
+    }
+
+    /// The first of the paths of a pixel of their own, which goes on from this one.
+    #[must_use]
+    pub fn apart(&self, number: u32) -> Self {
+        Self::new(hash(hash(self.seed, self.index), number), 0)
+    }
+
     /// Two numbers in 0…1 (1 excluded).
     #[must_use]
     pub fn pair(&self, dimension: u32) -> Vec2 {
@@ -69,6 +81,18 @@ mod tests {
                 assert_eq!(boxes, [1; 64], "seed {seed}, dimension {dimension}: {columns} columns");
             }
         }
+    }
+
+    #[test]
+    fn paths_that_split_are_stratified_together() {
+        let mut boxes = vec![0; 64];
+        for (index, k) in (0..16).flat_map(|index| (0..4).map(move |k| (index, k))) {
+            let p = Sampler::new(9, index).split(4, k).pair(3);
+            boxes[(p.y * 8.0) as usize * 8 + (p.x * 8.0) as usize] += 1;
+        }
+        assert_eq!(boxes, [1; 64], "4 of 16 paths each");
+        let [one, other] = [1, 2].map(|number| Sampler::new(9, 0).apart(number).pair(3));
+        assert_ne!(one, other, "those that are apart are others");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use glossy_ext::{Lambert, Ward};
 use hr_diffuse::{Light, LightKind, Shape, Surface};
 use hr_scene::{Material, Primaries, ToneMap};
 
-fn material(reflector: impl Reflector + 'static, exitance: f32, two_sided: bool) -> Material {
+pub(super) fn material(reflector: impl Reflector + 'static, exitance: f32, two_sided: bool) -> Material {
     Material {
         name: String::new(),
         reflector: Arc::new(reflector),
@@ -38,7 +38,7 @@ fn seen(scene: &Scene, eye: DVec3, at: DVec3, paths: u32) -> (f64, f64) {
     let direction = (target - origin).normalize();
     let (mut sum, mut squares) = (0.0, 0.0);
     for index in 0..paths {
-        let value = f64::from(tracer.path(origin, direction, &Sampler::new(17, index), &|_| None).x);
+        let value = f64::from(tracer.path(origin, direction, &Sampler::new(17, index)).x);
         sum += value;
         squares += value * value;
     }
@@ -220,4 +220,61 @@ fn emitters_are_seen_without_what_they_reflect() {
     for p in tracer.emission(&camera).pixels {
         assert!((p - expected).abs().max_element() < 1e-5, "{p}, expected {expected}");
     }
+}
+
+/// Ground below a strong lamp that a plate hides and a weak one that is seen.
+pub(super) fn hidden_lamp() -> Scene {
+    let surfaces = vec![
+        square(0.3, 0.0, false, 0),
+        square(2.0, 0.8, false, 0),
+        square(0.4, 1.0, true, 1),
+        square(0.1, 0.6, true, 2),
+    ];
+    let lamp = |exitance| material(Lambert::BLACK, exitance, true);
+    scene(surfaces, vec![material(lambert(0.6), 0.0, true), lamp(20.0), lamp(16.0)])
+}
+
+/// Knows which emitters light the ground, and nothing else.
+struct Ground(Nearby);
+
+impl Known for Ground {
+    fn end(&self, ray: &Ray<'_>) -> Option<Rgb> {
+        (ray.bounce > 0).then_some(Rgb::ZERO)
+    }
+
+    fn nearby(&self, hit: &Hit) -> Option<&Nearby> {
+        (hit.surface == 0).then_some(&self.0)
+    }
+
+    fn glowing(&self, _: &Hit) -> Option<u32> {
+        None
+    }
+}
+
+#[test]
+fn emitters_that_are_seen_are_drawn_and_the_mean_stays() {
+    let scene = hidden_lamp();
+    let rays = visibility(&scene).expect("sound");
+    let tracer = PathTracer::new(&scene, &rays);
+    let place = Place { surface: 0, domain: hr_diffuse::Domain::WHOLE, back: false };
+    let [knowing, not_knowing] = [Nearby::new(tracer.emitters(), &rays, &place, 1), Nearby::default()].map(Ground);
+    let unit = |p: DVec3| tracer.normalization.to_unit(p);
+    let (origin, target) = (unit(dvec3(1.0, 0.3, 0.5)), unit(DVec3::ZERO));
+    let seen = |known: &Ground| {
+        let paths = 32_768;
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for index in 0..paths {
+            let sampler = Sampler::new(5, index);
+            let light = f64::from(tracer.seen(origin, (target - origin).normalize(), &sampler, known).1.x);
+            (sum, squares) = (sum + light, squares + light * light);
+        }
+        let mean = sum / f64::from(paths);
+        (mean, (squares / f64::from(paths) - mean * mean).sqrt() / f64::from(paths).sqrt())
+    };
+    let expected = 0.6 / std::f64::consts::PI * 16.0 * parallel_square(0.1, 0.6);
+    let (known, plain) = (seen(&knowing), seen(&not_knowing));
+    agrees(known, expected, "known");
+    // The other one's draws go to the hidden lamp, but for those few.
+    assert!(plain.1 > 3.0 * known.1, "noise {} of what is known, {} else", known.1, plain.1);
+    assert!((plain.0 - expected).abs() < 4.0 * plain.1, "{} expected, {plain:?} without", expected);
 }

@@ -1,0 +1,198 @@
+//! Pictures that know what their pixels see of each surface.
+//!
+//! A print shows less than radiance: a lamp is white, were it a hundred times as bright. Were the samples of a pixel averaged
+//! as radiance, the least corner of a lamp would make the whole pixel white, and its edge jagged. What a screen shows is light,
+//! too, and the mean of a pixel is that of its prints. But samples are noisy, and the curve bends: the mean of their prints would
+//! be darker than the print of their mean. So samples of the same surface are averaged as radiance, and what is then printed
+//! of each surface is averaged by its share of the pixel, as graphics devices do it that shade once and sample edges.
+
+use crate::tonemap::{Print, srgb_transfer};
+use crate::{Image, Primaries, Rgb};
+use crate::{ImageKind, SceneError, ToneMap};
+use glam::DVec3;
+use std::path::Path;
+
+/// What a pixel sees of one surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Part {
+    surface: Option<u32>,
+    sum: DVec3,
+    /// Of the means of the channels.
+    squares: f64,
+    samples: u32,
+}
+
+/// Samples of a pixel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pixel {
+    parts: Vec<Part>,
+}
+
+impl Pixel {
+    /// Adds the radiance, W/(m² sr), of a sample of a surface, or of none.
+    pub fn add(&mut self, surface: Option<u32>, radiance: Rgb) {
+        let sum = radiance.as_dvec3();
+        let squares = (sum.element_sum() / 3.0).powi(2);
+        match self.parts.iter_mut().find(|part| part.surface == surface) {
+            Some(part) => {
+                part.sum += sum;
+                part.squares += squares;
+                part.samples += 1;
+            }
+            None => self.parts.push(Part { surface, sum, squares, samples: 1 }),
+        }
+    }
+
+    /// Mean radiance; black without samples.
+    #[must_use]
+    pub fn radiance(&self) -> Rgb {
+        (self.parts.iter().map(|part| part.sum).sum::<DVec3>() / f64::from(self.samples().max(1))).as_vec3()
+    }
+
+    /// Whether surfaces differ by more than this share of the brightest.
+    #[must_use]
+    pub fn has_edge(&self, share: f32) -> bool {
+        let means = || self.parts.iter().map(|part| (part.sum / f64::from(part.samples)).as_vec3());
+        let (low, high) = means().fold((Rgb::INFINITY, Rgb::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
+        (high - low).max_element() > share * high.max_element()
+    }
+
+    /// Standard error of what is seen of the surfaces, were samples independent, in terms of the mean; 0 where nothing is known of it.
+    #[must_use]
+    pub fn noise(&self) -> f32 {
+        let (mut variance, mut light) = (0.0, 0.0);
+        for part in &self.parts {
+            let (n, mean) = (f64::from(part.samples), part.sum.element_sum() / (3.0 * f64::from(part.samples)));
+            light += n * mean;
+            if part.samples > 1 {
+                variance += n * n * (part.squares / n - mean * mean).max(0.0) / (n - 1.0);
+            }
+        }
+        if light > 0.0 { (variance.sqrt() / light) as f32 } else { 0.0 }
+    }
+
+    fn samples(&self) -> u32 {
+        self.parts.iter().map(|part| part.samples).sum()
+    }
+}
+
+/// A picture of linear radiance, and what is printed otherwise of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    /// Mean radiance of each pixel.
+    pub image: Image,
+    /// Pixels that are printed from their own samples.
+    own: Vec<(usize, Pixel)>,
+}
+
+impl Film {
+    /// A picture, and those of its pixels that are printed otherwise, because they see several surfaces or have more samples: their
+    /// places in it and their samples.
+    #[must_use]
+    pub fn new(image: Image, own: Vec<(usize, Pixel)>) -> Self {
+        Self { image, own }
+    }
+
+    /// Saves as [`Image::save`] does; only a `.png` shows the difference.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn save(&self, path: &Path, tone_map: &ToneMap, primaries: Primaries) -> Result<(), SceneError> {
+        match ImageKind::of(path)? {
+            ImageKind::Pfm | ImageKind::Exr => self.image.save(path, tone_map, primaries),
+            ImageKind::Png => self.image.save_codes(path, &self.to_srgb8(tone_map, primaries)),
+        }
+    }
+
+    /// Tone-mapped 8-bit sRGB, three bytes a pixel, row 0 on top.
+    #[must_use]
+    pub fn to_srgb8(&self, tone_map: &ToneMap, primaries: Primaries) -> Vec<u8> {
+        let print = tone_map.print(&self.image.pixels, primaries);
+        let mut codes: Vec<u8> = self.image.pixels.iter().flat_map(|&p| print.srgb8(p)).collect();
+        for (place, pixel) in &self.own {
+            if let Some(code) = codes.chunks_exact_mut(3).nth(*place) {
+                code.copy_from_slice(&mixed(&print, pixel));
+            }
+        }
+        codes
+    }
+}
+
+/// The light that a screen shows of a pixel: the mean of what is printed of its surfaces.
+fn mixed(print: &Print, pixel: &Pixel) -> [u8; 3] {
+    let mut light = DVec3::ZERO;
+    for part in &pixel.parts {
+        let radiance = (part.sum / f64::from(part.samples)).as_vec3();
+        light += print.linear(radiance).as_dvec3() * f64::from(part.samples);
+    }
+    (light / f64::from(pixel.samples().max(1))).to_array().map(|v| (255.0 * srgb_transfer(v)).round() as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Exposure;
+
+    const MAP: ToneMap = ToneMap { exposure: Exposure::Factor(1.0), stops: 0.0 };
+
+    /// A film of one pixel with samples of a wall and of a lamp.
+    fn pixel(wall: u32, lamp: u32) -> Film {
+        let mut pixel = Pixel::default();
+        (0..wall).for_each(|_| pixel.add(Some(0), Rgb::splat(0.1)));
+        (0..lamp).for_each(|_| pixel.add(Some(1), Rgb::splat(500.0)));
+        let image = Image { width: 1, height: 1, pixels: vec![pixel.radiance()] };
+        Film::new(image, vec![(0, pixel)])
+    }
+
+    #[test]
+    fn lamps_cover_as_much_of_a_pixel_as_is_seen_of_them() {
+        let linear = |film: &Film| {
+            let v = f64::from(film.to_srgb8(&MAP, Primaries::Rec709)[0]) / 255.0;
+            if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+        };
+        let (dark, bright) = (linear(&pixel(9, 0)), linear(&pixel(0, 9)));
+        assert!(bright == 1.0 && dark < 0.2, "a dark wall and a white lamp: {dark} {bright}");
+        for lamp in 1..9 {
+            let film = pixel(9 - lamp, lamp);
+            let share = f64::from(lamp) / 9.0;
+            let expected = dark + (bright - dark) * share;
+            // Half a code of 8 bits is 0.5 % of light at most, where the curve is steepest.
+            assert!((linear(&film) - expected).abs() < 0.005, "{lamp} of 9: {} not {expected}", linear(&film));
+            let radiance = film.image.pixels[0].x;
+            assert!((f64::from(radiance) - 0.1 - 499.9 * share).abs() < 1e-3, "radiance is linear: {radiance}");
+        }
+    }
+
+    #[test]
+    fn noise_is_that_within_surfaces() {
+        let mut pixel = Pixel::default();
+        assert_eq!(pixel.noise(), 0.0, "nothing is known");
+        for light in [1.0, 3.0, 1.0, 3.0] {
+            pixel.add(Some(0), Rgb::splat(light));
+        }
+        // Variance of the mean of 4: 1/(4 − 1); the mean is 2.
+        assert!((pixel.noise() - (1.0_f32 / 3.0).sqrt() / 2.0).abs() < 1e-6, "{}", pixel.noise());
+        (0..4).for_each(|_| pixel.add(Some(1), Rgb::splat(6.0)));
+        // Half of the pixel is sure, and the mean is 4.
+        assert!((pixel.noise() - 0.5 * (1.0_f32 / 3.0).sqrt() / 4.0).abs() < 1e-6, "{}", pixel.noise());
+    }
+
+    #[test]
+    fn noise_of_one_surface_does_not_darken_it() {
+        let mut pixel = Pixel::default();
+        for k in 0..16 {
+            pixel.add(Some(7), if k == 0 { Rgb::splat(16.0) } else { Rgb::ZERO });
+        }
+        let image = Image { width: 1, height: 1, pixels: vec![pixel.radiance()] };
+        assert_eq!(image.pixels[0], Rgb::ONE, "a sixteenth of 16");
+        assert!(!pixel.has_edge(0.1), "one surface has no edge");
+        let printed = Film::new(image.clone(), vec![(0, pixel.clone())]).to_srgb8(&MAP, Primaries::Rec709);
+        assert_eq!(printed, image.to_srgb8(&MAP, Primaries::Rec709), "printed as its mean");
+        pixel.add(None, Rgb::ZERO);
+        assert!(pixel.has_edge(0.1), "what is behind it differs");
+        pixel = Pixel::default();
+        pixel.add(Some(1), Rgb::splat(1.0));
+        pixel.add(Some(2), Rgb::splat(1.05));
+        assert!(!pixel.has_edge(0.1) && pixel.has_edge(0.01), "surfaces that look alike have no edge");
+    }
+}

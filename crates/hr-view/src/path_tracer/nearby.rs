@@ -1,0 +1,185 @@
+//! Which emitters light a place: what is drawn where somebody knows it.
+//!
+//! Emitters that are strong but hidden, such as bulbs in their shades, would take most of the draws, and what is left for those
+//! that are seen would be noise: a few strong samples among many of none. So a few rays find, once for each place that somebody
+//! tells apart, which emitters are seen from it and how much each of them brings. Draws follow that; a share of
+//! them goes by power alone, so that nothing is missed whose rays were all blocked.
+
+use super::emitters::Emitters;
+use glam::{Vec2, Vec3};
+use hr_diffuse::sampling::{hash, point2};
+use hr_diffuse::visibility::NO_BLOCKER;
+use hr_diffuse::{Domain, Visibility};
+
+/// Share of draws that go by power alone.
+const BY_POWER: f32 = 0.1;
+/// Rays look for at most so many emitters, those that would bring most were nothing between …
+const LOOKED_AT: usize = 64;
+/// … and of the others so much is believed to be seen.
+const BELIEVED: f32 = 0.25;
+/// Rays to each of them.
+const RAYS: u32 = 8;
+/// Of an emitter that no ray found so much is believed to be seen.
+const LEAST_SEEN: f32 = 0.1;
+/// Emitters that bring less than this of all are left to power.
+const FAINT: f32 = 1e-4;
+/// Cosine that counts at least: shading normals are bent, and places are large.
+const LEAST_COSINE: f32 = 0.05;
+
+/// One side of a part of a surface, whose emitters are looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// The surface.
+    pub surface: u32,
+    /// The part of it.
+    pub domain: Domain,
+    /// Whether it is its back.
+    pub back: bool,
+}
+
+/// The emitters of a place, and the chance of each.
+#[derive(Clone, Debug, Default)]
+pub struct Nearby {
+    /// Emitters, rising.
+    entries: Vec<u32>,
+    /// Chance of each and of all before it, up to 1.
+    sums: Vec<f32>,
+    /// Share of each that is seen, about, > 0.
+    seen: Vec<f32>,
+}
+
+/// An emitter that is looked at.
+struct Found {
+    entry: u32,
+    /// What it brings, sum of channels; at first as if nothing were between.
+    light: f32,
+    seen: f32,
+}
+
+impl Nearby {
+    /// Looks for them by rays.
+    #[must_use]
+    pub fn new(emitters: &Emitters, visibility: &Visibility, place: &Place, seed: u32) -> Self {
+        let geometries = visibility.geometries();
+        let points: [_; RAYS as usize] = std::array::from_fn(|k| {
+            let u = point2(hash(seed, 0), k as u32);
+            let (point, front) = geometries[place.surface as usize].sample(place.domain, u.x, u.y);
+            (point, if place.back { -front } else { front })
+        });
+        // Sum of the channels of what an emitter brings to a point.
+        let brings = |entry: u32, (at, normal): (Vec3, Vec3), u: Vec2| {
+            let arrival = emitters.shine(geometries, at, entry, u, 1.0)?;
+            let cosine = arrival.direction.dot(normal);
+            (cosine > 0.0).then(|| (arrival.irradiance.element_sum() * cosine.max(LEAST_COSINE), arrival))
+        };
+        let unblocked = |entry: u32| {
+            // Parts that glow are many and small, emitters may be spheres, half of whose points face away.
+            let looks = if emitters.is_glowing(entry) { 2 } else { RAYS };
+            let light =
+                |k: u32| brings(entry, points[k as usize], point2(hash(seed, 1 + entry), k)).map(|(light, _)| light);
+            (0..looks).filter_map(light).sum::<f32>() / looks as f32
+        };
+        let mut found: Vec<_> =
+            (0..emitters.len() as u32).map(|entry| Found { entry, light: unblocked(entry), seen: BELIEVED }).collect();
+        found.sort_by(|a, b| b.light.total_cmp(&a.light));
+        for Found { entry, light, seen } in found.iter_mut().take(LOOKED_AT) {
+            let (mut all, mut open) = (0.0, 0.0);
+            for (k, &point) in points.iter().enumerate() {
+                let drawn = brings(*entry, point, point2(hash(seed, 1 + *entry), k as u32));
+                let Some((brought, arrival)) = drawn else { continue };
+                all += brought;
+                let ends = [place.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
+                if !visibility.occluded(point.0, arrival.from, ends, &mut { NO_BLOCKER }) {
+                    open += brought;
+                }
+            }
+            (*light, *seen) = (all / RAYS as f32, if all > 0.0 { (open / all).max(LEAST_SEEN) } else { BELIEVED });
+        }
+        for Found { light, seen, .. } in &mut found {
+            *light *= *seen;
+        }
+        let total: f32 = found.iter().map(|found| found.light).sum();
+        found.retain(|found| found.light > FAINT * total && found.light.is_finite());
+        found.sort_unstable_by_key(|found| found.entry);
+        let total: f32 = found.iter().map(|found| found.light).sum();
+        let mut sum = 0.0;
+        let add = |found: &Found| {
+            sum += found.light / total;
+            sum
+        };
+        Self {
+            sums: found.iter().map(add).collect(),
+            entries: found.iter().map(|found| found.entry).collect(),
+            seen: found.iter().map(|found| found.seen).collect(),
+        }
+    }
+
+    /// Share of an emitter that is seen, about, > 0.
+    pub(super) fn seen(&self, entry: u32) -> f32 {
+        self.entries.binary_search(&entry).map_or(BELIEVED, |at| self.seen[at])
+    }
+
+    /// The emitter that a number in 0…1 picks, or a number in 0…1 that is to pick one by power.
+    pub(super) fn pick(&self, choice: f32) -> Result<u32, f32> {
+        let Some(last) = self.entries.len().checked_sub(1) else { return Err(choice) };
+        if choice < BY_POWER {
+            return Err(choice / BY_POWER);
+        }
+        let choice = (choice - BY_POWER) / (1.0 - BY_POWER);
+        // Rounding may leave the last sum a little below the choice.
+        Ok(self.entries[self.sums.partition_point(|&sum| sum <= choice).min(last)])
+    }
+
+    /// The chance of an emitter whose chance by power alone is given.
+    pub(super) fn chance(&self, entry: u32, by_power: f32) -> f32 {
+        if self.entries.is_empty() {
+            return by_power;
+        }
+        let own = self.entries.binary_search(&entry).map_or(0.0, |at| {
+            let before = at.checked_sub(1).map_or(0.0, |before| self.sums[before]);
+            self.sums[at] - before
+        });
+        BY_POWER * by_power + (1.0 - BY_POWER) * own
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{hidden_lamp, material};
+    use super::*;
+    use crate::path_tracer::{PathTracer, visibility};
+    use glossy_ext::Lambert;
+    use hr_diffuse::{Light, LightKind, Rgb};
+
+    #[test]
+    fn chances_add_up_to_1_and_follow_what_is_seen() {
+        let mut scene = hidden_lamp();
+        scene.materials.push(material(Lambert::BLACK, 0.0, true));
+        let position = glam::dvec3(0.0, 0.0, 0.2);
+        scene.lights = vec![Light { position, intensity: Rgb::splat(1e-4), kind: LightKind::Point }];
+        let rays = visibility(&scene).expect("sound");
+        let tracer = PathTracer::new(&scene, &rays);
+        let ground = Place { surface: 0, domain: Domain::WHOLE, back: false };
+        let nearby = Nearby::new(tracer.emitters(), &rays, &ground, 3);
+        let count = tracer.emitters().len() as u32;
+        let by_power = 1.0 / count as f32;
+        let chances: Vec<f32> = (0..count).map(|entry| nearby.chance(entry, by_power)).collect();
+        assert!((chances.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{chances:?}");
+        // Draws follow them.
+        let mut drawn = vec![0.0; count as usize];
+        let n = 4096;
+        for i in 0..n {
+            match nearby.pick((i as f32 + 0.5) / n as f32) {
+                Ok(entry) => drawn[entry as usize] += 1.0 / n as f32,
+                Err(rest) => drawn[(rest * count as f32) as usize] += 1.0 / n as f32,
+            }
+        }
+        for (drawn, chance) in drawn.iter().zip(&chances) {
+            assert!((drawn - chance).abs() < 2.0 / n as f32 * count as f32, "{drawn} {chance}");
+        }
+        // The hidden lamp is 20 times as strong as the other one.
+        let [strong, weak] =
+            [2, 3].map(|surface| chances[tracer.emitters().of_surface(surface).expect("it shines") as usize]);
+        assert!(weak > strong, "hidden: {strong}, seen: {weak}");
+    }
+}
