@@ -6,12 +6,14 @@
 //! as the whole that it belongs to, as far as its own rays do not know better. Of narrow lobes rays would miss the peaks:
 //! directional light is left out on both sides.
 
-use crate::hierarchy::{Elements, Kind};
+use crate::hierarchy::Elements;
 use crate::hooks::LightField;
 use crate::residual::diffuse_along;
-use crate::sampling::{cosine_direction, hash, point4};
+use crate::sampling::{cosine_direction, hash, point4, unit};
+use crate::segments::receiving_point;
 use crate::threads::{self, prelude::*};
 use crate::transport::Light;
+use glam::Vec2;
 use std::ops::ControlFlow;
 
 /// What is believed before anything is compared, in relative terms.
@@ -35,7 +37,7 @@ const MOST: f64 = 1.2;
 /// … and by less where more than this share of it is reflected, in proportion to what is not: what is wrong is repeated many
 /// times there, and the rows' sums are right. So rows of form factors times reflectance stay below 1 if they were before.
 const REFLECTED: f64 = 0.8;
-/// Leaves that a thread looks from between two calls of `watch`: some milliseconds.
+/// Places that a thread looks from between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 64;
 
 /// Sums over observations: of what was found, of what is compared with it, and of the squares.
@@ -72,7 +74,7 @@ impl Sums {
     }
 }
 
-/// Factors for reflected light, in the order of the leaves in `brought`, each with what links bring of diffusely reflected light
+/// Factors for reflected light, in the order of the places in `brought`, each with what links bring of diffusely reflected light
 /// (sum of channels); from so many rays, and how many were shot. `None` where `watch` breaks.
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
@@ -80,44 +82,42 @@ pub(crate) fn calibrate<L: LightField>(
     rays: usize,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<(Vec<f32>, u64)> {
-    let weight = |&(leaf, brought): &(u32, f32)| {
-        let element = light.element(leaf);
-        let counts = brought > 0.0 && light.elements.exposed(leaf) >= 1.0;
+    let weight = |&(place, brought): &(u32, f32)| {
+        let element = light.element(place);
+        let counts = brought > 0.0 && light.elements.exposed(place) >= 1.0;
         if counts { f64::from(element.area * element.importance) } else { 0.0 }
     };
     let (mut area, mut power) = (0.0, 0.0);
-    for leaf in brought {
-        area += weight(leaf);
-        power += weight(leaf) * f64::from(leaf.1);
+    for place in brought {
+        area += weight(place);
+        power += weight(place) * f64::from(place.1);
     }
     let mean = power / area;
     let total = 2.0 * power;
     if !(total > 0.0 && total.is_finite()) {
         return Some((vec![1.0; brought.len()], 0));
     }
-    // How many rays start from each leaf, and what each of them counts.
+    // How many rays start from each place, and what each of them counts.
     let mut sum = 0.0_f64;
     let counts: Vec<(u32, f64)> = brought
         .iter()
-        .map(|leaf| {
-            let share = weight(leaf) * (mean + f64::from(leaf.1)) / total * rays as f64;
+        .map(|place| {
+            let share = weight(place) * (mean + f64::from(place.1)) / total * rays as f64;
             let first = sum.round() as u64;
             sum += share;
             let count = (sum.round() as u64 - first) as u32;
-            (count, if share > 0.0 { weight(leaf) / share } else { 0.0 })
+            (count, if share > 0.0 { weight(place) / share } else { 0.0 })
         })
         .collect();
     let look = |index: usize| {
-        let ((leaf, brought), (count, each)) = (brought[index], counts[index]);
-        let element = light.element(leaf);
-        let geometry = &light.scene.surfaces()[element.source as usize];
-        let seed = hash(leaf, 0x1c0d);
+        let ((place, brought), (count, each)) = (brought[index], counts[index]);
+        let seed = hash(place, 0x1c0d);
         let mut sums = Sums::default();
         for ray in 0..count {
             let u = point4(seed, ray);
-            let (x, normal, _) = geometry.sample_area(element.domain, u.z, u.w);
-            let n = if element.kind == Kind::Back { -normal } else { normal };
-            let found = diffuse_along(light, x, cosine_direction(n, u.x, u.y), element.source);
+            let on = (unit(hash(hash(seed, 0x53), ray)), Vec2::new(u.z, u.w));
+            let Some((x, n, surface)) = receiving_point(light, place, on) else { continue };
+            let found = diffuse_along(light, x, cosine_direction(n, u.x, u.y), surface);
             sums.add(&Sums::of(each * f64::from(found), each * f64::from(brought)));
         }
         sums
@@ -130,15 +130,15 @@ pub(crate) fn calibrate<L: LightField>(
         let part = found.len()..brought.len().min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
         found.par_extend(part.into_par_iter().with_min_len(8).map(look));
     }
-    let factors = factors(light.elements, brought.iter().map(|leaf| leaf.0).zip(found), OF_LINKS);
-    let factor = |&(leaf, _): &(u32, f32)| {
-        let absorbed = (1.0 - f64::from(light.element(leaf).importance)) / (1.0 - REFLECTED);
-        (1.0 + (factors[leaf as usize].clamp(MOST.recip(), MOST) - 1.0) * absorbed.clamp(0.0, 1.0)) as f32
+    let factors = factors(light.elements, brought.iter().map(|place| place.0).zip(found), OF_LINKS);
+    let factor = |&(place, _): &(u32, f32)| {
+        let absorbed = (1.0 - f64::from(light.element(place).importance)) / (1.0 - REFLECTED);
+        (1.0 + (factors[place as usize].clamp(MOST.recip(), MOST) - 1.0) * absorbed.clamp(0.0, 1.0)) as f32
     };
     Some((brought.iter().map(factor).collect(), counts.iter().map(|(count, _)| u64::from(*count)).sum()))
 }
 
-/// By node, what is found over what it is compared with, by the observations at leaves: of each part as of its whole, as far as
+/// By node, what is found over what it is compared with, by the observations at leaves or places: of each part as of its whole, as far as
 /// its own observations do not know better.
 pub(crate) fn factors(elements: &Elements, found: impl Iterator<Item = (u32, Sums)>, doubt: Doubt) -> Vec<f64> {
     let nodes = &elements.nodes;

@@ -4,13 +4,17 @@ use crate::Rgb;
 use crate::calibrate::calibrate;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::{LightField, NodeId, Transfer};
+use crate::inherited::Carried;
 use crate::kept_weights::KeptWeights;
 use crate::leaf_rows::balance;
 use crate::links::{Link, Links};
-use crate::push::{self, Push, Spread, visible};
+#[cfg(test)]
+use crate::places::Places;
+use crate::push::{self, Push, Spread, Weight, visible};
 use crate::shooting::Shot;
 use crate::threads::{self, prelude::*};
 use crate::transport::Light;
+use glam::Vec3;
 use std::ops::ControlFlow;
 
 /// Links that a thread evaluates between two calls of `watch`: about a millisecond.
@@ -39,6 +43,8 @@ pub(crate) const GROUPS: usize = 4;
 
 /// What arrives at a leaf of reflected light is calibrated where at least this share of it is diffuse.
 const MOSTLY_DIFFUSE: f32 = 0.9;
+/// Where nothing but senders is seen form factors sum to 1; but for rounding.
+const CLOSED: f32 = 0.999;
 /// Clusters that emit more than this share of their power count as emitters.
 const MOSTLY: f32 = 0.5;
 
@@ -72,9 +78,12 @@ pub(crate) struct Gather {
     /// By link.
     groups: Vec<Group>,
     push: Push,
-    /// By leaf, as in `push`: what makes the sum of its form factors what it should be, by group.
+    /// By place, as in `push`: what makes the sum of its form factors what it should be, by group.
     rows: Vec<[f32; GROUPS]>,
-    /// By link: the area that it lights, times what lets its light through, all leaves together. Where an extension takes part, else
+    /// By place of many leaves, in an enclosure: how much the sum of its form factors, which should be the same everywhere, seems to
+    /// change over it per unit of length, over the share of all but emitters, which it is put down to.
+    tilts: Vec<Vec3>,
+    /// By link: the area that it lights, times what lets its light through, all places together. Where an extension takes part, else
     /// nothing.
     lit: Vec<f32>,
     /// Irradiance by link.
@@ -96,34 +105,45 @@ impl Gather {
         let groups: Vec<Group> = links.all().par_iter().zip(&push.spreads).map(group).collect();
         // The rows of form factors are what would arrive of unit radiosity.
         let shares = links.all().par_iter().zip(&push.spreads).map(|(link, spread)| share(light, link, *spread));
-        let shares: Vec<f32> = shares.collect();
+        let each: Vec<f32> = shares.collect();
         let shares =
-            push.sums(light, links, (&groups, &shares)).into_iter().map(|[_, shares @ ..]| shares.map(|s| s.max(0.0)));
+            push.sums(light, links, (&groups, &each)).into_iter().map(|[_, shares @ ..]| shares.map(|s| s.max(0.0)));
         let shares: Vec<[f32; GROUPS - 1]> = shares.collect();
-        let rows = balance(light, &push.leaves, &shares, error.is_some());
-        let mut gather = Self { groups, push, rows, lit: Vec::new(), arriving: Vec::new() };
+        let rows = balance(light, &push.places.nodes, &shares, error.is_some());
+        let slopes = push.slopes(light, links, (&groups, &each), &rows);
+        let tilt = |(slope, index): ([f32; 3], usize)| {
+            let [emitters, rest @ ..]: [f32; GROUPS - 1] =
+                std::array::from_fn(|i| shares[index][i] * rows[index][i + 1]);
+            let rest: f32 = rest.iter().sum();
+            let closed = emitters + rest > CLOSED && rest > 0.0;
+            if closed { Vec3::from(slope) / rest } else { Vec3::ZERO }
+        };
+        let tilts = slopes.into_iter().zip(push.places.joined()).map(tilt).collect();
+        let mut gather = Self { groups, push, rows, tilts, lit: Vec::new(), arriving: Vec::new() };
         if light.element(0).active {
             gather.lit = gather.lit_areas(light, links);
         }
         gather
     }
 
-    /// Compares what arrives of diffusely reflected light with what so many rays find, and makes it so; returns the number of rays.
+    /// Compares what arrives of diffusely reflected light with what rays find, so many for each place that reflects any light, and
+    /// makes it so; returns the number of rays.
     pub(crate) fn calibrate<L: LightField>(
         &mut self,
         light: Light<'_, L>,
         links: &Links,
-        rays: usize,
+        rays_each: usize,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> u64 {
         let mut brought = self.diffuse(light, links);
         if light.element(0).active {
-            // Leaves have one weight for all that a link carries: where lobes make it, it tells nothing of what is diffuse.
-            for ((_, diffuse), (_, all)) in brought.iter_mut().zip(self.indirect(light, links)) {
+            // Places have one weight for all that a link carries: where lobes make it, it tells nothing of what is diffuse.
+            for ((_, diffuse), all) in brought.iter_mut().zip(self.reflected(light, links)) {
                 *diffuse = if *diffuse >= MOSTLY_DIFFUSE * all { *diffuse } else { 0.0 };
             }
         }
-        let Some((factors, rays)) = calibrate(light, &brought, rays, watch) else { return 0 };
+        let places = self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count();
+        let Some((factors, rays)) = calibrate(light, &brought, rays_each * places, watch) else { return 0 };
         for ((row, factor), (_, diffuse)) in self.rows.iter_mut().zip(factors).zip(brought) {
             if diffuse > 0.0 {
                 row[Group::Rest as usize] *= factor;
@@ -135,43 +155,79 @@ impl Gather {
 
     /// Whether it was prepared for these links.
     pub(crate) fn is_for(&self, links: &Links) -> bool {
-        !self.push.leaves.is_empty() && self.groups.len() == links.all().len()
+        !self.push.places.nodes.is_empty() && self.groups.len() == links.all().len()
     }
 
     /// By leaf, what arrives there of light that has been reflected (sum of channels).
     pub(crate) fn indirect<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
         let shares = light.reflected_shares();
-        self.by_leaf(light, links, |link, spread| {
+        let indirect =
+            |link: &Link, spread| carried(light, link, spread, None).element_sum() * shares[link.sender as usize];
+        let on_leaves = self.on_leaves(light, links, &self.carried(links, indirect));
+        on_leaves.into_iter().map(|(leaf, indirect)| (leaf, indirect.max(0.0))).collect()
+    }
+
+    /// The same by place.
+    fn reflected<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<f32> {
+        let shares = light.reflected_shares();
+        self.by_place(light, links, |link, spread| {
             carried(light, link, spread, None).element_sum() * shares[link.sender as usize]
         })
     }
 
-    /// By leaf, what arrives there of light that has been reflected diffusely (sum of channels).
+    /// By place, what arrives there of light that has been reflected diffusely (sum of channels).
     pub(crate) fn diffuse<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
         let shares = light.reflected_shares();
-        self.by_leaf(light, links, |link, spread| {
+        let diffuse = self.by_place(light, links, |link, spread| {
             let away = -light.direction_to(light.element(link.receiver).center, link.sender);
             let factor = link.factor * visible(link, spread) * shares[link.sender as usize];
             light.diffuse(link.sender, away).element_sum() * factor
-        })
+        });
+        self.push.places.nodes.iter().copied().zip(diffuse).collect()
     }
 
-    /// By leaf, what links bring that carry what `of` says.
-    fn by_leaf<L: LightField>(
+    /// By place, what links bring that carry what `of` says.
+    fn by_place<L: LightField>(
         &self,
         light: Light<'_, L>,
         links: &Links,
         of: impl Fn(&Link, Spread) -> f32 + Sync,
-    ) -> Vec<(u32, f32)> {
-        let carried = links.all().par_iter().zip(&self.push.spreads).map(|(link, spread)| of(link, *spread));
-        let carried: Vec<f32> = carried.collect();
+    ) -> Vec<f32> {
+        let carried = self.carried(links, of);
         let sums = self.push.sums(light, links, (&self.groups, &carried));
         let brought = |(sums, rows): ([f32; GROUPS], &[f32; GROUPS])| {
             let sum: f32 = sums.iter().zip(rows).map(|(sum, factor)| sum * factor).sum();
             sum.max(0.0)
         };
-        let brought = sums.into_iter().zip(&self.rows).map(brought);
-        self.push.leaves.iter().copied().zip(brought).collect()
+        sums.into_iter().zip(&self.rows).map(brought).collect()
+    }
+
+    /// By link, what it carries as `of` says.
+    fn carried(&self, links: &Links, of: impl Fn(&Link, Spread) -> f32 + Sync) -> Vec<f32> {
+        links.all().par_iter().zip(&self.push.spreads).map(|(link, spread)| of(link, *spread)).collect()
+    }
+
+    /// By leaf, what arrives there of what links carry.
+    fn on_leaves<L: LightField, T: Carried>(&self, light: Light<'_, L>, links: &Links, carried: &[T]) -> Vec<(u32, T)> {
+        let links_of = (self.groups.as_slice(), carried);
+        let (sums, mut slopes) =
+            (self.push.sums(light, links, links_of), self.push.slopes(light, links, links_of, &self.rows));
+        let counted = |index: usize, group: usize| sums[index][group] * self.rows[index][group];
+        for ((slope, tilt), index) in slopes.iter_mut().zip(&self.tilts).zip(self.push.places.joined()) {
+            let mut rest = counted(index, Group::Rest as usize);
+            rest += counted(index, Group::Faint as usize);
+            slope.iter_mut().zip(tilt.to_array()).for_each(|(slope, tilt)| *slope += rest * -tilt);
+        }
+        let mut leaves = Vec::new();
+        self.push.places.each_leaf(light.elements, |leaf, index, joined| {
+            let mut sum = T::default();
+            (0..GROUPS).for_each(|group| sum += counted(index, group));
+            if let Some((joined, from_middle)) = joined {
+                slopes[joined].iter().zip(from_middle.to_array()).for_each(|(&slope, by)| sum += slope * by);
+            }
+            leaves.push((leaf, sum));
+        });
+        leaves
     }
 
     /// See [`Push::grafted`].
@@ -180,20 +236,21 @@ impl Gather {
     }
 
     /// See [`Push::looked_at`].
-    pub(crate) fn looked_at(&self, elements: &Elements, leaf: u32) -> Vec<(usize, f32)> {
-        self.push.looked_at(elements, leaf)
+    pub(crate) fn looked_at(&self, elements: &Elements, place: u32) -> Vec<(usize, Weight)> {
+        self.push.looked_at(elements, place)
     }
 
     /// What links deliver: [`lit`](Self::lit).
     fn lit_areas<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<f32> {
         let nodes = &light.elements.nodes;
         let mut lit = vec![0.0; links.all().len()];
-        // By node and group: area of the leaves below, times what lets light through.
+        // By node and group: area of the places below, times what lets light through.
         let mut open = vec![[0.0; GROUPS]; nodes.len()];
-        for (index, &leaf) in self.push.leaves.iter().enumerate() {
-            let row = self.rows[index].map(|factor| factor * light.element(leaf).area);
-            self.push.each_weight(light, links, index, |at, weight| lit[at] += weight * row[self.groups[at] as usize]);
-            open[leaf as usize] = row;
+        for (index, &place) in self.push.places.nodes.iter().enumerate() {
+            let row = self.rows[index].map(|factor| factor * light.element(place).area);
+            self.push
+                .each_weight(light, links, index, |at, weight| lit[at] += weight.value * row[self.groups[at] as usize]);
+            open[place as usize] = row;
         }
         for node in (1..nodes.len()).rev() {
             let below = open[node];
@@ -225,7 +282,13 @@ impl Gather {
         self.push.faint_links
     }
 
-    /// Rays shot for the leaves' weights.
+    /// Where light arrives.
+    #[cfg(test)]
+    pub(crate) fn places(&self) -> &Places {
+        &self.push.places
+    }
+
+    /// Rays shot for places and their weights.
     pub(crate) fn rays(&self) -> u64 {
         self.push.rays
     }
@@ -306,11 +369,7 @@ impl Gather {
 
     /// Irradiance of all leaves.
     pub(crate) fn push<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, Rgb)> {
-        let sums = self.push.sums(light, links, (&self.groups, &self.arriving));
-        let irradiance = |(sums, rows): ([Rgb; GROUPS], &[f32; GROUPS])| -> Rgb {
-            sums.into_iter().zip(rows).map(|(sum, factor)| sum * *factor).sum()
-        };
-        self.push.leaves.iter().copied().zip(sums.into_iter().zip(&self.rows).map(irradiance)).collect()
+        self.on_leaves(light, links, &self.arriving)
     }
 }
 

@@ -504,7 +504,13 @@ impl Elements {
 
     /// Ids of the leaves that are parts of surfaces, in order.
     pub fn patch_leaves(&self) -> impl Iterator<Item = u32> + '_ {
-        self.nodes.iter().enumerate().filter(|(_, e)| e.child_count == 0 && e.is_patch()).map(|(i, _)| i as u32)
+        (0..self.nodes.len() as u32).filter(|&node| self.is_patch_leaf(node))
+    }
+
+    /// Whether a node is one of them.
+    pub(crate) fn is_patch_leaf(&self, node: u32) -> bool {
+        let element = &self.nodes[node as usize];
+        element.child_count == 0 && element.is_patch()
     }
 }
 

@@ -89,7 +89,7 @@ impl<T: Carried> Handed<T> {
     }
 }
 
-/// What a leaf inherits.
+/// What a place inherits.
 #[derive(Debug)]
 pub(crate) struct Inherited<'a, T> {
     summed: &'a Summed<T>,
@@ -148,15 +148,20 @@ pub(crate) struct Above<'a, T> {
     pub(crate) carried: &'a [T],
 }
 
-/// Calls `leaf` with each leaf and what it inherits; the answers by leaf, in order.
+/// Calls `answer` with each place and what it inherits; the answers by place, in order. All leaves that are parts of surfaces
+/// are places, or lie below one.
 pub(crate) fn inherit<L: LightField, T: Carried, R: Send>(
     light: Light<'_, L>,
     above: Above<'_, T>,
-    leaf: impl Fn(u32, &Inherited<'_, T>) -> R + Sync,
+    is_place: impl Fn(u32) -> bool + Sync,
+    answer: impl Fn(u32, &Inherited<'_, T>) -> R + Sync,
 ) -> Vec<(u32, R)> {
     let nodes = &light.elements.nodes;
     let mut below = vec![1_u32; nodes.len()];
     for node in (1..nodes.len()).rev() {
+        if is_place(node as u32) {
+            below[node] = 1;
+        }
         below[nodes[node].parent as usize] += below[node];
     }
     let mut starts = Vec::new();
@@ -168,13 +173,12 @@ pub(crate) fn inherit<L: LightField, T: Carried, R: Send>(
         }
         small
     };
-    descend(light, above, root, &mut begin, |_, _| unreachable!("a leaf has no more than one node below it"));
+    let at_places = |_: u32, _: &Inherited<'_, T>| unreachable!("nothing else is below a place");
+    descend(light, above, root, (&mut begin, &is_place), at_places);
     let answers = starts.into_par_iter().with_min_len(1).map(|start| {
         let mut answers = Vec::new();
-        descend(light, above, start, &mut |_, _, _| false, |node, inherited| {
-            if light.element(node).is_patch() {
-                answers.push((node, leaf(node, inherited)));
-            }
+        descend(light, above, start, (&mut |_, _, _| false, &is_place), |place, inherited| {
+            answers.push((place, answer(place, inherited)));
         });
         answers
     });
@@ -184,13 +188,13 @@ pub(crate) fn inherit<L: LightField, T: Carried, R: Send>(
     answers
 }
 
-/// Goes down from a node to all leaves below it, but not below nodes that `ends` says yes to.
+/// Goes down from a node to all places below it, but not below nodes that `ends` says yes to.
 fn descend<L: LightField, T: Carried>(
     light: Light<'_, L>,
     Above { links, spreads, groups, carried }: Above<'_, T>,
     start: Start<T>,
-    ends: &mut impl FnMut(u32, &Summed<T>, &[Handed<T>]) -> bool,
-    mut leaf: impl FnMut(u32, &Inherited<'_, T>),
+    (ends, is_place): (&mut impl FnMut(u32, &Summed<T>, &[Handed<T>]) -> bool, &impl Fn(u32) -> bool),
+    mut answer: impl FnMut(u32, &Inherited<'_, T>),
 ) {
     let (mut near, mut sums) = (start.near, vec![start.summed]);
     // Nodes that wait, with the number of nodes above them and what is handed to them.
@@ -203,9 +207,9 @@ fn descend<L: LightField, T: Carried>(
             continue;
         }
         let element = light.element(node);
-        let is_leaf = element.child_count == 0;
-        // A leaf looks at each of what is left.
-        let reach = if is_leaf { f32::INFINITY } else { (element.radius / ONE_DIRECTION).powi(2) };
+        let is_place = is_place(node);
+        // A place looks at each of what is left.
+        let reach = if is_place { f32::INFINITY } else { (element.radius / ONE_DIRECTION).powi(2) };
         for i in from.clone() {
             let handed = near[i];
             let (direction, light, distance2) = handed.at(element.center);
@@ -234,8 +238,8 @@ fn descend<L: LightField, T: Carried>(
             }
         }
         let handed = from.end..near.len();
-        if is_leaf {
-            leaf(node, &Inherited { summed: &summed, near: &near[handed] });
+        if is_place {
+            answer(node, &Inherited { summed: &summed, near: &near[handed] });
             continue;
         }
         sums.push(summed);
@@ -305,10 +309,15 @@ mod tests {
         let groups = vec![Group::Rest; links.all().len()];
         let carried: Vec<f32> = links.all().iter().map(|link| link.factor * link.visibility.abs()).collect();
         let above = Above { links, spreads: &spreads, groups: &groups, carried: &carried };
-        let found = inherit(light, above, |leaf, inherited| {
-            let element = light.element(leaf);
-            inherited.on(element.center, &element.facing)[Group::Rest as usize]
-        });
+        let found = inherit(
+            light,
+            above,
+            |node| light.elements.is_patch_leaf(node),
+            |leaf, inherited| {
+                let element = light.element(leaf);
+                inherited.on(element.center, &element.facing)[Group::Rest as usize]
+            },
+        );
         let (mut apart, mut total, mut shared) = (0.0, 0.0, 0.0);
         for (leaf, found) in found {
             let (element, mut sum, mut node) = (light.element(leaf), 0.0, leaf);

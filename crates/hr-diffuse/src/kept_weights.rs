@@ -7,7 +7,7 @@ use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
 use crate::links::{Link, Links};
 use crate::moved::Moved;
-use crate::push::{Spread, visible};
+use crate::push::{Spread, Weight, visible};
 use crate::refine::Pair;
 use crate::transport::{Exitant, Light};
 use std::cmp::Reverse;
@@ -50,28 +50,28 @@ impl KeptWeights {
         self.rough.then_some(Self { rough: false, ..self })
     }
 
-    /// Weights of a leaf that stay, with their links: in the order of the nodes from the leaf up to the root, then of senders.
-    pub(crate) fn of<L: LightField>(&self, light: Light<'_, L>, leaf: u32) -> Vec<(Link, f32)> {
-        let stay = |(at, weight): (usize, f32)| {
+    /// Weights of a place that stay, with their links: in the order of the nodes from the place up to the root, then of senders.
+    pub(crate) fn of<L: LightField>(&self, light: Light<'_, L>, place: u32) -> Vec<(Link, Weight)> {
+        let stay = |(at, weight): (usize, Weight)| {
             let link = self.links.all()[at];
-            let pair = Pair { receiver: leaf, sender: link.sender };
+            let pair = Pair { receiver: place, sender: link.sender };
             let stays = self.even[link.sender as usize]
                 && (self.stays[at] || !self.moved.concerns(light.scene, light.elements, pair));
             stays.then_some((link, weight))
         };
-        self.gather.looked_at(light.elements, leaf).into_iter().filter_map(stay).collect()
+        self.gather.looked_at(light.elements, place).into_iter().filter_map(stay).collect()
     }
 }
 
-/// The weight for a link among those of a leaf that are left; the links before it are passed over.
-pub(crate) fn take(known: &mut Peekable<IntoIter<(Link, f32)>>, link: &Link) -> Option<f32> {
+/// The weight for a link among those of a place that are left; the links before it are passed over.
+pub(crate) fn take(known: &mut Peekable<IntoIter<(Link, Weight)>>, link: &Link) -> Option<Weight> {
     let place = |link: &Link| (Reverse(link.receiver), link.sender);
     while known.next_if(|(other, _)| place(other) < place(link)).is_some() {}
     let (before, weight) = known.next_if(|(other, _)| place(other) == place(link))?;
     // What the link brings to its receiver may be another mean now.
     let brings = |link: &Link| link.factor * visible(link, Spread::Exact);
-    let weight = weight * brings(&before) / brings(link);
-    weight.is_finite().then_some(weight)
+    let weight = weight * (brings(&before) / brings(link));
+    weight.value.is_finite().then_some(weight)
 }
 
 /// By node: by which share of its power the light of its parts is distributed otherwise than it was.

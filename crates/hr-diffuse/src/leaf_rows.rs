@@ -1,11 +1,12 @@
-//! Row sums of leaves: in an enclosure the form factors of each leaf sum to 1, so no light is lost or made on the way;
+//! Row sums of leaves, and of [places](crate::places) of several: in an enclosure the form factors of each leaf sum to 1, so no light is lost or made on the way;
 //! nowhere to more, so that light dies out wherever reflectances are below 1.
 
 use crate::Rgb;
 use crate::gather::GROUPS;
 use crate::hierarchy::Kind;
 use crate::hooks::LightField;
-use crate::sampling::{cosine_direction, hash, point2};
+use crate::sampling::{cosine_direction, hash, point2, unit};
+use crate::segments::receiving_point;
 use crate::threads::prelude::*;
 use crate::transport::Light;
 
@@ -19,12 +20,12 @@ const MOST_RAISE: f32 = 3.0;
 /// the other side would be left alone, and light be lost; so it is the mean over a side of a surface that is kept below 1.
 const MOST_SEEN: f32 = 1.1;
 
-/// Sums of form factors times visibility of a leaf, by which its light is balanced.
+/// Sums of form factors times visibility of a place, by which its light is balanced.
 #[derive(Clone, Copy, Debug)]
 struct LeafRow {
     /// Of emitters, of other links that leaves look at, and of faint ones.
     shares: [f32; 3],
-    /// Share of the leaf that light may reach.
+    /// Share of the place that light may reach.
     exposed: f32,
 }
 
@@ -53,33 +54,38 @@ impl LeafRow {
 
 /// Rays that tell whether a side of a surface sees nothing but senders: at least so many, …
 const CLOSED_RAYS: u32 = 32;
-/// … and so many for each leaf.
-const CLOSED_RAYS_PER_LEAF: u32 = 4;
+/// … and so many for each place.
+const CLOSED_RAYS_PER_PLACE: u32 = 4;
 
-/// By leaf, the factors for the light of each group that balance its row, by the shares of all but the first; for nothing but the
+/// By place, the factors for the light of each group that balance its row, by the shares of all but the first; for nothing but the
 /// limits where nobody is to `look`. Rows are 1 where all that is seen from a side of a surface sends light: as many rays as
 /// are shot miss an opening only if it hardly counts.
 pub(crate) fn balance<L: LightField>(
     light: Light<'_, L>,
-    leaves: &[u32],
+    places: &[u32],
     shares: &[[f32; GROUPS - 1]],
     look: bool,
 ) -> Vec<[f32; GROUPS]> {
-    let side = |leaf: u32| (light.element(leaf).source, light.element(leaf).kind == Kind::Back);
-    let mut order: Vec<u32> = (0..leaves.len() as u32).collect();
-    order.sort_by_key(|&index| side(leaves[index as usize]));
-    let sides: Vec<&[u32]> = order.chunk_by(|&a, &b| side(leaves[a as usize]) == side(leaves[b as usize])).collect();
+    let side = |index: u32| {
+        let (place, element) = (places[index as usize], light.element(places[index as usize]));
+        // A place of several surfaces is a side for itself.
+        (element.source, if element.is_patch() { u32::from(element.kind == Kind::Back) } else { place })
+    };
+    let mut order: Vec<u32> = (0..places.len() as u32).collect();
+    order.sort_by_key(|&index| side(index));
+    let sides: Vec<&[u32]> = order.chunk_by(|&a, &b| side(a) == side(b)).collect();
     let of_side = |side: &&[u32]| {
-        let leaf = |index: u32| leaves[index as usize];
-        let row = |index: u32| LeafRow { shares: shares[index as usize], exposed: light.elements.exposed(leaf(index)) };
-        let rays = CLOSED_RAYS_PER_LEAF.max(CLOSED_RAYS / side.len() as u32);
-        let is_lit = |index: &u32| light.exitant.irradiance[leaf(*index) as usize] != Rgb::ZERO;
-        let sees_senders = |&index: &u32| (0..rays).all(|ray| sees_sender(light, leaf(index), ray));
+        let place = |index: u32| places[index as usize];
+        let row =
+            |index: u32| LeafRow { shares: shares[index as usize], exposed: light.elements.exposed(place(index)) };
+        let rays = CLOSED_RAYS_PER_PLACE.max(CLOSED_RAYS / side.len() as u32);
+        let is_lit = |index: &u32| light.exitant.irradiance[place(*index) as usize] != Rgb::ZERO;
+        let sees_senders = |&index: &u32| (0..rays).all(|ray| sees_sender(light, place(index), ray));
         let closed = look && side.iter().filter(|index| is_lit(index)).all(sees_senders);
         let (mut area, mut sum) = (0.0, 0.0);
         for &index in side.iter().filter(|&&index| row(index).exposed >= 1.0) {
-            area += light.element(leaf(index)).area;
-            sum += light.element(leaf(index)).area * row(index).sum();
+            area += light.element(place(index)).area;
+            sum += light.element(place(index)).area * row(index).sum();
         }
         let most = if sum > area { area / sum } else { 1.0 };
         let factors = |&index: &u32| {
@@ -93,21 +99,20 @@ pub(crate) fn balance<L: LightField>(
         side.iter().map(factors).collect::<Vec<_>>()
     };
     let balanced: Vec<Vec<[f32; GROUPS]>> = sides.par_iter().with_min_len(4).map(of_side).collect();
-    let mut factors = vec![[0.0; GROUPS]; leaves.len()];
+    let mut factors = vec![[0.0; GROUPS]; places.len()];
     for (&index, balanced) in order.iter().zip(balanced.into_iter().flatten()) {
         factors[index as usize] = balanced;
     }
     factors
 }
 
-/// Whether a random ray from a leaf meets something that sends light.
-fn sees_sender<L: LightField>(light: Light<'_, L>, leaf: u32, ray: u32) -> bool {
-    let element = light.element(leaf);
-    let (u, v) = (point2(hash(leaf, 0x8e1d), ray), point2(hash(leaf, 0x77a3), ray));
-    let (x, normal) = light.scene.surfaces()[element.source as usize].sample(element.domain, u.x, u.y);
-    let n = if element.kind == Kind::Back { -normal } else { normal };
+/// Whether a random ray from a place meets something that sends light.
+fn sees_sender<L: LightField>(light: Light<'_, L>, place: u32, ray: u32) -> bool {
+    let (u, v) = (point2(hash(place, 0x8e1d), ray), point2(hash(place, 0x77a3), ray));
+    let choice = unit(hash(hash(place, 0x91c7), ray));
+    let Some((x, n, surface)) = receiving_point(light, place, (choice, u)) else { return false };
     let direction = cosine_direction(n, v.x, v.y);
-    let hit = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, element.source);
+    let hit = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface);
     let met = hit.and_then(|hit| light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv));
     met.is_some_and(|leaf| light.emitted_most(leaf.0) > 0.0)
 }

@@ -32,6 +32,7 @@ mod leaf_rows;
 pub mod links;
 mod moved;
 pub mod oracle;
+mod places;
 mod proofs;
 mod push;
 mod rearrange;

@@ -232,8 +232,16 @@ pub fn spot_ramp(cosine: f32, cos_inner: f32, cos_outer: f32) -> f32 {
     t * t
 }
 
-/// Whether all of `other` lies behind the plane of `element` (or in it).
+/// Whether all of `other` lies behind the plane of `element` (or in it); behind all planes of a cluster that faces one way, by
+/// boxes. Neighbours in one plane never see each other.
 fn behind(scene: &SceneData, element: &Element, other: &Element) -> bool {
+    let n = element.normals.axis;
+    if element.kind == Kind::Cluster && element.normals.cos_angle >= 1.0 {
+        let up = n.cmpge(Vec3::ZERO);
+        let lowest = Vec3::select(up, element.bounds[0], element.bounds[1]);
+        let highest = Vec3::select(up, other.bounds[1], other.bounds[0]);
+        return (highest - lowest).dot(n) - 2.0 * ROUNDING * n.abs().element_sum() <= IN_PLANE;
+    }
     is_plane(element) && heights(scene, element, other).1 - ROUNDING <= IN_PLANE
 }
 

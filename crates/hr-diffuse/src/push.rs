@@ -1,26 +1,27 @@
 //! Push: the light that inner nodes received is handed down to the leaves below them.
 //!
 //! A link holds the mean over the node that it ends at; a leaf in a corner of it sees more of the sender or less, from
-//! another side. So every leaf has a weight for each link above it: what the sender brings to the leaf's own place, over
-//! what it brings to the node. The weights stay the same until links change, and are kept where they fit. Links that bring
+//! another side. So every leaf, or [place](crate::places) of several, has a weight for each link above it: what the sender brings
+//! there, over what it brings to the node. The weights stay the same until links change, and are kept where they fit. Links that bring
 //! next to nothing are spread evenly over flat nodes, and by orientation and distance alone over others: see
 //! [`inherited`](crate::inherited).
 
 use crate::NodeId;
 use crate::gather::{GROUPS, Group};
-use crate::hierarchy::{Element, Elements, GRAFT, Kind, SceneData, grafted};
+use crate::hierarchy::{Element, Elements, GRAFT, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
 use crate::inherited::{Above, Carried, inherit};
 use crate::kept_weights::{KeptWeights, take};
 use crate::links::{Link, Links};
+use crate::places::{Edges, Places};
 use crate::sampling::hash;
-use crate::segments::visibility;
+use crate::segments::{receiving_point, visibility};
 use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
 use crate::visibility::Proof;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Mul};
 
 /// No more weights than these are kept: 256 MB. In larger scenes the leaves beyond have weights by orientation and distance
 /// alone, which are found anew in each iteration.
@@ -34,6 +35,13 @@ const OWN_SHARE: f32 = 0.02;
 const FAR: f32 = 0.25;
 /// Links that bring a leaf more than this share of its light from near by are looked at from several points of it.
 const MUCH: f32 = 0.01;
+/// Points of a place lie across a line if they do by this share of their spread (of squares).
+const LEAST_SPREAD: f32 = 0.01;
+/// Irradiance × importance × √(share of all area) that a place of many leaves may be off its mean by for the edge of a shadow, as a
+/// share of the error times the mean irradiance.
+const EDGE_SHARE: f32 = 0.008;
+/// So many points of a place of many leaves.
+const CLUSTER_POINTS: u32 = 8;
 /// Leaves get no more than this times what a link brings on average. Surfaces that lie in one another's plane hide each
 /// other by turns, which no mean visibility can tell.
 const MOST_WEIGHT: f32 = 8.0;
@@ -53,7 +61,7 @@ const MAY_BE_VISIBLE: f32 = 0.1;
 pub(crate) const LINK_BYTES: usize = size_of::<Spread>() + size_of::<f32>();
 /// … and for each leaf, beside its weights.
 pub(crate) const LEAF_BYTES: usize = size_of::<u32>() + size_of::<usize>();
-/// Leaves whose weights a thread finds between two calls of `watch`: some milliseconds.
+/// Places whose weights a thread finds between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 32;
 
 /// How a link's light is spread over the leaves below its receiver.
@@ -67,10 +75,10 @@ pub(crate) enum Spread {
     Exact,
 }
 
-/// The leaves, and what light on their ancestors means to them.
+/// The places, and what light on their ancestors means to them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Push {
-    pub(crate) leaves: Vec<u32>,
+    pub(crate) places: Places,
     /// By link.
     pub(crate) spreads: Vec<Spread>,
     /// Relative error of the solution.
@@ -79,11 +87,11 @@ pub(crate) struct Push {
     means: Vec<f32>,
     /// Links that would be looked at closely if they brought more.
     pub(crate) faint_links: u64,
-    /// Rays shot for the weights.
+    /// Rays shot for places and weights.
     pub(crate) rays: u64,
-    /// Where the weights of each leaf begin; as many leaves as have kept ones, and the end of the last.
+    /// Where the weights of each place begin; as many places as have kept ones, and the end of the last.
     first: Vec<usize>,
-    /// By leaf, then by node from the leaf up to the root, then by those links of the node that have weights.
+    /// By place, then by node from there up to the root, then by those links of the node that have weights.
     weights: Vec<f32>,
     /// Links that have weights, in order.
     weighted: Vec<u32>,
@@ -92,7 +100,7 @@ pub(crate) struct Push {
 }
 
 impl Push {
-    /// Finds the weights of the leaves but for those `known`, for a solution with the given relative error; where there is none,
+    /// Finds the places and their weights but for those `known`, for a solution with the given relative error; where there is none,
     /// and where `watch` breaks, by orientation and distance alone. The weights that are kept take no more than `room` bytes.
     pub(crate) fn new<L: LightField>(
         light: Light<'_, L>,
@@ -101,10 +109,12 @@ impl Push {
         (room, known): (u64, Option<&KeptWeights>),
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
-        let leaves: Vec<u32> = light.elements.patch_leaves().collect();
         let (spreads, means) = spreads(light, links, error);
+        let all_light = light.exitant.irradiance[0].element_sum();
+        let edges = error.map(|error| Edges { means: &means, least: EDGE_SHARE * error * all_light });
+        let (places, found_by) = Places::new(light, links, edges);
         let mut push = Self {
-            leaves,
+            places,
             spreads,
             error: error.unwrap_or_default(),
             means,
@@ -120,7 +130,7 @@ impl Push {
                 |(link, spread): &(&Link, &Spread)| **spread != Spread::Exact && is_shared(light, link.receiver);
             push.faint_links = links.all().iter().zip(&push.spreads).filter(faint).count() as u64;
         }
-        // How many weights a leaf has, by node: its own and those of all above it.
+        // How many weights a place has, by node: its own and those of all above it.
         let mut counts = vec![0_u32; light.elements.nodes.len()];
         for (node, element) in light.elements.nodes.iter().enumerate() {
             let own = links.range(node as u32).filter(|&at| push.spreads[at] == Spread::Exact).map(|at| at as u32);
@@ -131,8 +141,8 @@ impl Push {
             counts[node] = own + if node > 0 { counts[element.parent as usize] } else { 0 };
         }
         let kept = MOST_KEPT.min((room / size_of::<f32>() as u64) as usize);
-        for &leaf in &push.leaves {
-            let end = push.first[push.first.len() - 1] + counts[leaf as usize] as usize;
+        for &place in &push.places.nodes {
+            let end = push.first[push.first.len() - 1] + counts[place as usize] as usize * numbers(light, place);
             if end > kept {
                 break;
             }
@@ -141,21 +151,21 @@ impl Push {
         let mut weights = vec![0.0; push.first[push.first.len() - 1]];
         let mut parts: Vec<(u32, &mut [f32])> = Vec::with_capacity(push.first.len());
         let mut rest = weights.as_mut_slice();
-        for (range, &leaf) in push.first.windows(2).zip(&push.leaves) {
+        for (range, &place) in push.first.windows(2).zip(&push.places.nodes) {
             let (part, after) = rest.split_at_mut(range[1] - range[0]);
-            parts.push((leaf, part));
+            parts.push((place, part));
             rest = after;
         }
         let chunk = if error.is_some() { BETWEEN_WATCHES * threads::current_num_threads() } else { parts.len().max(1) };
-        let (mut rays, rough) = (0, error.is_none() || known.is_some_and(|known| known.rough));
+        let (mut rays, rough) = (found_by, error.is_none() || known.is_some_and(|known| known.rough));
         for part in parts.chunks_mut(chunk) {
             if error.is_some() && watch().is_break() {
                 return Self::new(light, links, None, (room, None), watch);
             }
-            let shot = part.par_iter_mut().with_min_len(4).map(|(leaf, weights)| {
-                let (mut slots, mut rays) = (weights.iter_mut(), 0);
-                let mut known = known.map_or_else(Vec::new, |it| it.of(light, *leaf)).into_iter().peekable();
-                push.each(light, *leaf, |place, at| {
+            let shot = part.par_iter_mut().with_min_len(4).map(|(node, weights)| {
+                let (mut slots, mut rays) = (weights.chunks_exact_mut(numbers(light, *node)), 0);
+                let mut known = known.map_or_else(Vec::new, |it| it.of(light, *node)).into_iter().peekable();
+                push.each(light, *node, |place, at| {
                     if let Some(slot) = slots.next() {
                         let link = &links.all()[at];
                         let find = || match rough {
@@ -163,7 +173,7 @@ impl Push {
                             false => place.weight(light, link, push.means[at], rays),
                         };
                         let (weight, shot) = take(&mut known, link).map_or_else(find, |weight| (weight, 0));
-                        *slot = weight;
+                        weight.keep(slot);
                         rays += shot;
                     }
                 });
@@ -176,9 +186,9 @@ impl Push {
         push
     }
 
-    /// Leaves have the ids that they have after [`Elements::graft`].
+    /// Places have the ids that they have after [`Elements::graft`].
     pub(crate) fn grafted(&mut self) {
-        self.leaves.iter_mut().for_each(|leaf| *leaf = grafted(*leaf));
+        self.places.grafted();
         // The nodes that come in between have no links yet.
         if let Some(&end) = self.first_weighted.get(1) {
             self.first_weighted.insert(0, 0);
@@ -186,13 +196,14 @@ impl Push {
         }
     }
 
-    /// Weights of a leaf for links that were looked at closely, by place among `links`: from the leaf up to the root.
-    pub(crate) fn looked_at(&self, elements: &Elements, leaf: u32) -> Vec<(usize, f32)> {
-        let index = self.leaves.binary_search(&leaf).ok();
+    /// Weights of a place for links that were looked at closely, by their position among `links`: from the place up to the root.
+    pub(crate) fn looked_at(&self, elements: &Elements, place: u32) -> Vec<(usize, Weight)> {
+        let index = self.places.nodes.binary_search(&place).ok();
         let Some(range) = index.and_then(|index| self.first.get(index..index + 2)) else { return Vec::new() };
-        let mut weights = self.weights[range[0]..range[1]].iter();
+        let numbers = if elements.nodes[place as usize].is_patch() { 1 } else { Weight::NUMBERS };
+        let mut weights = self.weights[range[0]..range[1]].chunks_exact(numbers);
         let mut found = Vec::with_capacity(weights.len());
-        self.weighted_above(elements, leaf, |at| found.extend(weights.next().map(|&weight| (at, weight))));
+        self.weighted_above(elements, place, |at| found.extend(weights.next().map(|weight| (at, Weight::of(weight)))));
         found
     }
 
@@ -201,9 +212,9 @@ impl Push {
         size_of_val(self.weights.as_slice()) as u64
     }
 
-    /// Calls `visit` with every link above a leaf that has weights, by place among all: from the leaf up to the root.
-    fn weighted_above(&self, elements: &Elements, leaf: u32, mut visit: impl FnMut(usize)) {
-        let mut node = leaf as usize;
+    /// Calls `visit` with every link above a place that has weights, by position among all: from the place up to the root.
+    fn weighted_above(&self, elements: &Elements, place: u32, mut visit: impl FnMut(usize)) {
+        let mut node = place as usize;
         loop {
             let range = self.first_weighted[node] as usize..self.first_weighted[node + 1] as usize;
             self.weighted[range].iter().for_each(|&at| visit(at as usize));
@@ -214,29 +225,29 @@ impl Push {
         }
     }
 
-    /// The same with the leaf's place.
-    fn each<L: LightField>(&self, light: Light<'_, L>, leaf: u32, mut visit: impl FnMut(&Place, usize)) {
-        let place = Place::new(light, leaf, self.error);
-        self.weighted_above(light.elements, leaf, |at| visit(&place, at));
+    /// The same with the place itself.
+    fn each<L: LightField>(&self, light: Light<'_, L>, node: u32, mut visit: impl FnMut(&Place, usize)) {
+        let place = Place::new(light, node, self.places.middle(light.elements, node), self.error);
+        self.weighted_above(light.elements, node, |at| visit(&place, at));
     }
 
-    /// Calls `visit` with every link above the leaf at an index of `leaves` that has weights, and the leaf's weight for it.
+    /// Calls `visit` with every link above the place of an index that has weights, and the place's weight for it.
     pub(crate) fn each_weight<L: LightField>(
         &self,
         light: Light<'_, L>,
         links: &Links,
         index: usize,
-        mut visit: impl FnMut(usize, f32),
+        mut visit: impl FnMut(usize, Weight),
     ) {
-        let leaf = self.leaves[index];
+        let node = self.places.nodes[index];
         let Some(range) = self.first.get(index..index + 2) else {
-            return self.each(light, leaf, |place, at| visit(at, place.plain(light, &links.all()[at])));
+            return self.each(light, node, |place, at| visit(at, place.plain(light, &links.all()[at])));
         };
-        let mut weights = self.weights[range[0]..range[1]].iter();
-        self.weighted_above(light.elements, leaf, |at| visit(at, weights.next().copied().unwrap_or_default()));
+        let mut weights = self.weights[range[0]..range[1]].chunks_exact(numbers(light, node));
+        self.weighted_above(light.elements, node, |at| visit(at, weights.next().map(Weight::of).unwrap_or_default()));
     }
 
-    /// The sum of what links carry to each leaf, by group.
+    /// The sum of what links carry to each place, by group.
     pub(crate) fn sums<L: LightField, T: Carried>(
         &self,
         light: Light<'_, L>,
@@ -244,15 +255,38 @@ impl Push {
         (groups, carried): (&[Group], &[T]),
     ) -> Vec<[T; GROUPS]> {
         let above = Above { links, spreads: &self.spreads, groups, carried };
-        let sums = inherit(light, above, |leaf, inherited| {
-            let element = light.element(leaf);
-            let mut sums = inherited.on(element.center, &element.facing);
-            if let Ok(index) = self.leaves.binary_search(&leaf) {
-                self.each_weight(light, links, index, |at, weight| sums[groups[at] as usize] += carried[at] * weight);
-            }
+        let mut index = vec![u32::MAX; light.elements.nodes.len()];
+        self.places.nodes.iter().zip(0..).for_each(|(&place, at)| index[place as usize] = at);
+        let is_place = |node: u32| index[node as usize] != u32::MAX;
+        let sums = inherit(light, above, is_place, |place, inherited| {
+            let mut sums = inherited.on(self.places.middle(light.elements, place), &light.element(place).facing);
+            let index = index[place as usize] as usize;
+            self.each_weight(light, links, index, |at, weight| {
+                sums[groups[at] as usize] += carried[at] * weight.value;
+            });
             sums
         });
         sums.into_iter().map(|(_, sums)| sums).collect()
+    }
+
+    /// How what links carry varies over each place of many leaves, per unit of length, where `rows` (by place) tells what each group
+    /// counts: as links do that are looked at closely.
+    pub(crate) fn slopes<L: LightField, T: Carried>(
+        &self,
+        light: Light<'_, L>,
+        links: &Links,
+        (groups, carried): (&[Group], &[T]),
+        rows: &[[f32; GROUPS]],
+    ) -> Vec<[T; 3]> {
+        let slope = |index: usize| {
+            let mut slope = [T::default(); 3];
+            self.each_weight(light, links, index, |at, weight| {
+                let arriving = carried[at] * rows[index][groups[at] as usize];
+                slope.iter_mut().zip(weight.slope.to_array()).for_each(|(slope, by)| *slope += arriving * by);
+            });
+            slope
+        };
+        self.places.joined().into_par_iter().with_min_len(16).map(slope).collect()
     }
 }
 
@@ -290,13 +324,54 @@ fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -
     (if closely { Spread::Exact } else { even }, mean)
 }
 
-/// A leaf, and the points that stand for it.
+/// How many numbers are kept of a weight of a place.
+fn numbers<L: LightField>(light: Light<'_, L>, place: u32) -> usize {
+    if light.element(place).is_patch() { 1 } else { Weight::NUMBERS }
+}
+
+/// What a link brings to a place over what it brings to its receiver.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Weight {
+    pub(crate) value: f32,
+    /// How it changes over a place of many leaves, per unit of length.
+    slope: Vec3,
+}
+
+impl Weight {
+    /// Numbers that are kept where there is a slope.
+    const NUMBERS: usize = 4;
+
+    fn of(kept: &[f32]) -> Self {
+        let slope = if let [_, x, y, z] = *kept { Vec3::new(x, y, z) } else { Vec3::ZERO };
+        Self { value: kept[0], slope }
+    }
+
+    /// Not below 0 within a radius.
+    fn positive(self, radius: f32) -> Self {
+        Self { slope: self.slope.clamp_length_max(self.value / radius.max(f32::MIN_POSITIVE)), ..self }
+    }
+
+    fn keep(self, kept: &mut [f32]) {
+        let Vec3 { x, y, z } = self.slope;
+        kept.iter_mut().zip([self.value, x, y, z]).for_each(|(kept, number)| *kept = number);
+    }
+}
+
+impl Mul<f32> for Weight {
+    type Output = Self;
+
+    fn mul(self, factor: f32) -> Self {
+        Self { value: self.value * factor, slope: self.slope * factor }
+    }
+}
+
+/// A place, and the points that stand for it.
 struct Place {
-    leaf: u32,
+    node: u32,
     /// Its middle, with its normal and the weight 1, …
     middle: (Vec3, Vec3, f32),
     /// … and points, normals and weights (sum 1) that stand for all of it.
-    points: SmallVec<[(Vec3, Vec3, f32); 4]>,
+    points: SmallVec<[(Vec3, Vec3, f32); 8]>,
     /// What is brought by links that such points are worth (sum of channels).
     much: f32,
     /// Senders that bring less than this are not resolved into parts (largest channel), …
@@ -306,23 +381,61 @@ struct Place {
 }
 
 impl Place {
-    fn new<L: LightField>(light: Light<'_, L>, leaf: u32, error: f32) -> Self {
-        let element = light.element(leaf);
-        let irradiance = light.exitant.irradiance[leaf as usize];
+    fn new<L: LightField>(light: Light<'_, L>, node: u32, middle: Vec3, error: f32) -> Self {
+        let element = light.element(node);
+        let irradiance = light.exitant.irradiance[node as usize];
         Self {
-            leaf,
-            middle: (element.center, element.normals.axis, 1.0),
-            points: sample_points(light.scene, element),
+            node,
+            middle: (middle, element.normals.axis, 1.0),
+            points: points_of(light, node),
             much: MUCH * irradiance.element_sum(),
             negligible: NEGLIGIBLE * irradiance.max_element(),
             faint: FAINT_SHARE * error.sqrt() * irradiance.element_sum(),
         }
     }
 
-    /// What a link brings to the leaf over what it brings to its receiver, by orientation and distance alone.
-    fn plain<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> f32 {
+    /// What a link brings to the place over what it brings to its receiver, by orientation and distance alone.
+    fn plain<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
         let known = link.visibility.abs() / visible(link, Spread::Exact);
-        self.turned(light, link) * known
+        let value = self.turned(light, link) * known;
+        let element = light.element(self.node);
+        if element.is_patch() || light.elements.is_distant(NodeId(link.sender)) {
+            return Weight { value, slope: Vec3::ZERO };
+        }
+        // (to·n) / d³ has the slope 3 (to·n) to / d⁵ − n / d³, of which the last part is not in the plane.
+        let (middle, normal, _) = self.middle;
+        let to = light.element(link.sender).center - middle;
+        let slope = to.reject_from_normalized(normal) * (3.0 * value / to.length_squared().max(1e-12));
+        Weight { value, slope }.positive(element.radius)
+    }
+
+    /// What a link brings that is wholly visible, where it varies over the place.
+    fn varying<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
+        let at = |x: Vec3, n: Vec3| light.arriving_at(x, n, link.sender, self.negligible).0.element_sum();
+        let values: SmallVec<[f32; 8]> = self.points.iter().map(|&(x, n, weight)| weight * at(x, n)).collect();
+        let value = values.iter().sum();
+        let element = light.element(self.node);
+        if element.is_patch() {
+            return Weight { value, slope: Vec3::ZERO };
+        }
+        // The plane that fits best: of (s, t) from the mean of the points, by the normal equations.
+        let (u, v) = self.middle.1.any_orthonormal_pair();
+        let mean: Vec3 = self.points.iter().map(|&(x, _, weight)| x * weight).sum();
+        let (mut squares, mut products) = ([0.0; 3], Vec2::ZERO);
+        for (&(x, _, weight), &brought) in self.points.iter().zip(&values) {
+            let at = Vec2::new((x - mean).dot(u), (x - mean).dot(v));
+            let more = [at.x * at.x, at.x * at.y, at.y * at.y].map(|square| square * weight);
+            squares.iter_mut().zip(more).for_each(|(square, more)| *square += more);
+            products += at * (brought - weight * value);
+        }
+        let [ss, st, tt] = squares;
+        // Points along a line tell nothing of what is across.
+        let least = LEAST_SPREAD * (ss + tt);
+        let (ss, tt) = (ss + least, tt + least);
+        let slope = Vec2::new(tt * products.x - st * products.y, ss * products.y - st * products.x);
+        let slope = (u * slope.x + v * slope.y) / (ss * tt - st * st).max(f32::MIN_POSITIVE);
+        let value = (value + slope.dot(self.middle.0 - mean)).max(0.0);
+        Weight { value, slope }.positive(element.radius)
     }
 
     /// The same as if the link's sender were seen as much of from everywhere.
@@ -330,17 +443,18 @@ impl Place {
         if light.element(link.receiver).is_flat() {
             return 1.0;
         }
-        let element = light.element(self.leaf);
-        let (direction, scale) = renewed(light, link.sender, element.center, link.receiver);
+        let element = light.element(self.node);
+        let (direction, scale) = renewed(light, link.sender, self.middle.0, link.receiver);
         element.mean_cosine(direction) * scale
     }
 
     /// The same as asked for, and the number of rays shot after so many `before`; `mean` is what the link would bring to its receiver
     /// if it were wholly visible.
-    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32, before: u32) -> (f32, u32) {
-        let element = light.element(self.leaf);
+    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32, before: u32) -> (Weight, u32) {
+        let element = light.element(self.node);
+        let flat = element.is_flat();
         let visible = visible(link, Spread::Exact);
-        // A leaf that is small or far is told apart by its orientation; so is one that gets next to nothing.
+        // A place that is small or far is told apart by its orientation; so is one that gets next to nothing.
         let sender = light.element(link.sender);
         let apart = sender.center.distance_squared(element.center);
         let reach = element.radius + sender.radius;
@@ -350,38 +464,39 @@ impl Place {
         }
         let shared = is_shared(light, link.receiver);
         let here = if !shared {
-            mean
-        } else if element.is_flat() || !far {
-            let at = |&(x, n, weight): &(Vec3, Vec3, f32)| {
-                weight * light.arriving_at(x, n, link.sender, self.negligible).0.element_sum()
-            };
-            let varies = !element.is_flat() || !far && mean * visible > self.much;
-            if varies { self.points.iter().map(at).sum::<f32>() } else { at(&self.middle) }
+            Weight { value: mean, slope: Vec3::ZERO }
+        } else if !element.is_patch() || !far && (mean * visible > self.much || !flat) {
+            self.varying(light, link)
+        } else if flat {
+            let (x, n, _) = self.middle;
+            let value = light.arriving_at(x, n, link.sender, self.negligible).0.element_sum();
+            Weight { value, slope: Vec3::ZERO }
         } else {
             let direction = light.direction_to(element.center, link.sender);
             let (irradiance, _) = light.arriving_at(element.center, direction, link.sender, self.negligible);
-            irradiance.element_sum() * element.mean_cosine(direction)
+            let value = irradiance.element_sum() * element.mean_cosine(direction);
+            Weight { value, slope: Vec3::ZERO }
         };
-        if here <= 0.0 {
-            return (0.0, 0);
+        if here.value <= 0.0 {
+            return (Weight::default(), 0);
         }
-        let weight = (here / mean).min(MOST_WEIGHT);
+        let weight = here * ((here.value / mean).min(MOST_WEIGHT) / here.value);
         if link.visibility < 0.0 {
             return (weight, 0);
         }
         let worth = if shared { visible } else { visible.max(MAY_BE_VISIBLE) };
-        let (seen, rays) = self.seen(light, link, here * worth, before);
-        (weight * seen / visible, rays)
+        let (seen, rays) = self.seen(light, link, here.value * worth, before);
+        (weight * (seen / visible), rays)
     }
 
-    /// Share of a link's sender that the leaf sees, by as many rays as what it `brings` is worth, and their number. The rays of all
-    /// links go on with one sequence of points, so that they are spread evenly over the leaf.
+    /// Share of a link's sender that the place sees, by as many rays as what it `brings` is worth, and their number. The rays of all
+    /// links go on with one sequence of points, so that they are spread evenly over the place.
     fn seen<L: LightField>(&self, light: Light<'_, L>, link: &Link, brings: f32, before: u32) -> (f32, u32) {
-        let irradiance = light.exitant.irradiance[self.leaf as usize].element_sum();
+        let irradiance = light.exitant.irradiance[self.node as usize].element_sum();
         let rays = (RAYS * brings / irradiance.max(f32::MIN_POSITIVE)).clamp(LEAST_RAYS, MOST_RAYS) as u32;
-        let (mut blocker, seed) = (u32::MAX, hash(self.leaf, 0x1eaf));
+        let (mut blocker, seed) = (u32::MAX, hash(self.node, 0x1eaf));
         let sequence = (seed, before..before + rays);
-        let (seen, total, rays) = visibility(light, self.leaf, link.sender, sequence, (&Proof::Unknown, &mut blocker));
+        let (seen, total, rays) = visibility(light, self.node, link.sender, sequence, (&Proof::Unknown, &mut blocker));
         (if total > 0.0 { seen / total } else { 0.0 }, rays)
     }
 }
@@ -405,7 +520,18 @@ fn renewed<L: LightField>(light: Light<'_, L>, sender: u32, at: Vec3, node: u32)
     (direction, (before / now.max(1e-12)).clamp(0.25, 4.0))
 }
 
-/// Points, normals and weights (sum 1) that stand for a part of a surface.
+/// Points, normals and weights (sum 1) that stand for a place.
+fn points_of<L: LightField>(light: Light<'_, L>, node: u32) -> SmallVec<[(Vec3, Vec3, f32); 8]> {
+    let element = light.element(node);
+    if element.is_patch() {
+        return sample_points(light.scene, element).into_iter().collect();
+    }
+    let choice = |i: u32| (i as f32 + 0.5) / CLUSTER_POINTS as f32;
+    let points = (0..CLUSTER_POINTS).filter_map(|i| receiving_point(light, node, (choice(i), Vec2::splat(0.5))));
+    points.map(|(x, n, _)| (x, n, (CLUSTER_POINTS as f32).recip())).collect()
+}
+
+/// The same of a part of a surface.
 pub(crate) fn sample_points(scene: &SceneData, element: &Element) -> SmallVec<[(Vec3, Vec3, f32); 4]> {
     let geometry = &scene.surfaces()[element.source as usize];
     let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };

@@ -316,17 +316,22 @@ fn inherited<L: LightField>(
     let mut of_leaf: Vec<(u32, u32)> = vertices.leaf.iter().copied().zip(0..).collect();
     of_leaf.par_sort_unstable();
     let above = Above { links, spreads, groups: &groups, carried: &carried };
-    let found = inherit(light, above, |leaf, inherited| {
-        let first = of_leaf.partition_point(|&(other, _)| other < leaf);
-        let mine = of_leaf[first..].iter().take_while(|&&(other, _)| other == leaf);
-        let at_vertex = |&(_, vertex): &(u32, u32)| {
-            let (_, n) = point_on(light.scene, light.elements, leaf, places[vertex as usize]);
-            let [lights, emitters, mut rest, faint] = inherited.afar(&Facing::single(n));
-            rest += faint;
-            (vertex, [lights, emitters, rest].map(Brought::bounded))
-        };
-        (mine.map(at_vertex).collect::<SmallVec<[_; 2]>>(), inherited.near().collect::<SmallVec<[u32; 8]>>())
-    });
+    let found = inherit(
+        light,
+        above,
+        |node| light.elements.is_patch_leaf(node),
+        |leaf, inherited| {
+            let first = of_leaf.partition_point(|&(other, _)| other < leaf);
+            let mine = of_leaf[first..].iter().take_while(|&&(other, _)| other == leaf);
+            let at_vertex = |&(_, vertex): &(u32, u32)| {
+                let (_, n) = point_on(light.scene, light.elements, leaf, places[vertex as usize]);
+                let [lights, emitters, mut rest, faint] = inherited.afar(&Facing::single(n));
+                rest += faint;
+                (vertex, [lights, emitters, rest].map(Brought::bounded))
+            };
+            (mine.map(at_vertex).collect::<SmallVec<[_; 2]>>(), inherited.near().collect::<SmallVec<[u32; 8]>>())
+        },
+    );
     let mut from_afar = vec![[Brought::default(); 3]; vertices.positions.len()];
     let mut near = Near { all: Vec::new(), first: vec![0; light.elements.nodes.len() + 1] };
     for (leaf, (brought, links)) in found {

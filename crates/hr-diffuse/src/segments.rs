@@ -116,6 +116,17 @@ fn draw(
     }
 }
 
+/// A random point of a node that receives, by area, with the normal there and its surface, from three numbers in 0…1. `None` where
+/// light is of no importance.
+pub(crate) fn receiving_point<L: LightField>(
+    Light { scene, elements, .. }: Light<'_, L>,
+    node: u32,
+    (choice, u): (f32, Vec2),
+) -> Option<(Vec3, Vec3, u32)> {
+    let point = draw(scene, elements, node, (choice, u), Density::Receiving, None)?;
+    Some((point.at, point.normal, point.surface))
+}
+
 /// A part of a surface that a point is drawn from.
 struct Part {
     domain: Domain,

@@ -46,7 +46,7 @@ const CONVERGED_SHARE: f32 = 0.02;
 const MOST_ITERATIONS: u32 = 400;
 /// So many where light need only be there roughly.
 const FEW_ITERATIONS: u32 = 3;
-/// So many rays for each leaf are worth knowing how much reflected light links should bring.
+/// So many rays for each place are worth knowing how much reflected light links should bring.
 const CALIBRATE_RAYS: usize = 64;
 /// This share of the rays shot so far is worth knowing what the solution is off by, …
 const CHECK_SHARE: f32 = 0.1;
@@ -420,12 +420,10 @@ impl<L: LightField> Solver<L> {
         if self.stats.rays == 0 || *stopped || self.account.is_over() {
             return;
         }
-        let reflects = |leaf: &u32| self.elements.nodes[*leaf as usize].importance > 0.0;
-        let rays = CALIBRATE_RAYS * self.elements.patch_leaves().filter(reflects).count();
         let (start, account) = (Instant::now(), self.account);
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         let mut gather = std::mem::take(&mut self.gather);
-        let shot = gather.calibrate(self.light(), &self.links, rays, &mut || {
+        let shot = gather.calibrate(self.light(), &self.links, CALIBRATE_RAYS, &mut || {
             *stopped = *stopped || watch(&progress).is_break();
             if *stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });

@@ -3,7 +3,8 @@ use crate::form_factor::{Accuracy, Part, point_factor};
 use crate::geometry::tests::surface;
 use crate::hierarchy::Elements;
 use crate::sampling::{hash, unit};
-use crate::{DiffuseMaterial, Rgb, SceneInput, Settings, Solver};
+use crate::{DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solver, Surface};
+use glam::DVec3;
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
 use std::collections::BTreeMap;
@@ -138,4 +139,36 @@ fn bounds_hold_what_they_bound() {
         violations.len(),
         violations[..violations.len().min(12)].join("\n")
     );
+}
+
+/// Neighbours in one plane do not see each other, be they polygons or clusters; one that stands before it does.
+#[test]
+fn clusters_in_one_plane_do_not_face_each_other() {
+    let quad = |corner: DVec3, a: DVec3, b: DVec3| {
+        Surface::new(Shape::Quad([corner, corner + a, corner + a + b, corner + b]), 0)
+    };
+    let cells = |corner: DVec3, a: DVec3, b: DVec3| {
+        (0..64).map(move |i| quad(corner + a * f64::from(i % 8) + b * f64::from(i / 8), a, b))
+    };
+    let (x, y, z) = (DVec3::X * 0.1, DVec3::Y * 0.1, DVec3::Z * 0.1);
+    // Two parts of a floor, and a wall that faces them.
+    let floor = cells(DVec3::ZERO, x, y).chain(cells(DVec3::new(1.0, 0.0, 0.0), x, y));
+    let surfaces = floor.chain(cells(DVec3::new(2.5, 0.0, -0.1), y, z).map(|mut wall| {
+        if let Shape::Quad(corners) = &mut wall.shape {
+            corners.reverse();
+        }
+        wall
+    }));
+    let material = DiffuseMaterial { reflectance: Rgb::splat(0.5), exitance: Rgb::ZERO, two_sided: false };
+    let input = SceneInput { surfaces: surfaces.collect(), materials: vec![material], ..SceneInput::default() };
+    let solver = Solver::new(&input, Settings::with_error(0.1), ()).expect("sound");
+    let nodes = &solver.elements.nodes;
+    let up = |element: &&Element| element.normals.cos_angle >= 1.0 && element.normals.axis.z > 0.9;
+    let floors: Vec<&Element> = nodes.iter().filter(|element| element.kind == Kind::Cluster).filter(up).collect();
+    let walls: Vec<&Element> = nodes.iter().filter(|element| element.normals.axis.x < -0.9).collect();
+    assert!(floors.len() > 10 && walls.len() > 64, "{} and {} nodes", floors.len(), walls.len());
+    for a in &floors {
+        assert!(floors.iter().all(|b| factor_bounds(&solver.scene, a, b).is_none()), "{a:?}");
+        assert!(walls.iter().any(|wall| factor_bounds(&solver.scene, a, wall).is_some()), "{a:?}");
+    }
 }

@@ -20,7 +20,7 @@ fn weights_are_means_over_the_receiver() {
     let push = Push::new(light, links, Some(ERROR), (u64::MAX, None), &mut || ControlFlow::Continue(()));
     // By link: weight × area of the leaves below, and their area.
     let mut below = vec![[0.0_f64; 2]; links.all().len()];
-    for (index, &leaf) in push.leaves.iter().enumerate() {
+    for (index, &leaf) in push.places.nodes.iter().enumerate() {
         let mut weights = push.weights[push.first[index]..push.first[index + 1]].iter();
         push.each(light, leaf, |_, at| {
             let weight = weights.next().expect("a weight for each");
@@ -59,7 +59,7 @@ fn weights_that_are_not_kept_are_found_again() {
     let arriving: Vec<f32> = links.all().iter().zip(&all.spreads).map(bring).collect();
     let (mut apart, mut total) = (0.0, 0.0);
     let [kept, found] = [&all, &none].map(|push| push.sums(light, links, (&groups, &arriving)));
-    for (&leaf, ([.., kept, _], [.., found, _])) in all.leaves.iter().zip(kept.into_iter().zip(found)) {
+    for (&leaf, ([.., kept, _], [.., found, _])) in all.places.nodes.iter().zip(kept.into_iter().zip(found)) {
         apart += light.element(leaf).area * (kept - found);
         total += light.element(leaf).area * kept;
     }
@@ -98,7 +98,7 @@ fn links_that_look_blocked_lose_nothing() {
         let groups = vec![Group::Rest; links.all().len()];
         let sums = push.sums(light, &links, (&groups, &arriving));
         let leaf = |(&leaf, sums): (&u32, [f32; GROUPS])| light.element(leaf).area * sums.iter().sum::<f32>();
-        push.leaves.iter().zip(sums).map(leaf).sum::<f32>()
+        push.places.nodes.iter().zip(sums).map(leaf).sum::<f32>()
     };
     let (open, blocked) = (brought(|visibility| visibility), brought(|_| 0.0));
     assert!((blocked / open - 1.0).abs() < 0.1, "{blocked} of {open}");

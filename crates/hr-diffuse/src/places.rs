@@ -1,0 +1,245 @@
+//! Places: where light arrives. Leaves, mostly.
+//!
+//! In a finely cut scene polygons may be much smaller than what the error asks for. Then links begin and end at clusters far
+//! above them: refinement found it fine enough to take each of these for one. What a leaf finds out about the links above it,
+//! its neighbours find out once more. So a node in one plane, below which no link begins or ends, is one place, as a leaf of
+//! its size is in the same scene without the cuts: it looks for itself once, from points all over it, and the leaves below get
+//! what arrives there. Where the edge of a shadow passes through it is divided, as a leaf would be.
+
+use crate::hierarchy::{Elements, Kind, grafted};
+use crate::hooks::{FLAT_COSINE, LightField};
+use crate::links::Links;
+use crate::sampling::hash;
+use crate::segments::visibility;
+use crate::threads::prelude::*;
+use crate::transport::Light;
+use crate::visibility::{NO_BLOCKER, Proof};
+use glam::Vec3;
+
+/// Leaves whose heights over a plane differ by less than this share of their cluster's radius lie in one plane.
+const IN_PLANE: f32 = 0.02;
+/// Fewer leaves than that look for themselves: they know more of it, for little more.
+const LEAST_LEAVES: u32 = 8;
+/// Segments that tell how much of a sender is seen from all over a place.
+const SEGMENTS: u32 = 16;
+
+/// What is in one plane.
+#[derive(Clone, Copy)]
+struct Sheet {
+    /// A leaf of it, and how far others are off its plane.
+    leaf: u32,
+    off: f32,
+    /// Number of leaves.
+    count: u32,
+}
+
+/// Edges of shadows that no place is to have within.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Edges<'a> {
+    /// By link: what it brings if it is wholly visible (sum of channels).
+    pub(crate) means: &'a [f32],
+    /// Irradiance (sum of channels) × [`weight`](crate::hierarchy::Element::weight) by which a place may be off its mean.
+    pub(crate) least: f32,
+}
+
+/// The places, in order: all leaves are below one of them, or are one. With the number of rays shot for it.
+fn divided<L: LightField>(light: Light<'_, L>, links: &Links, edges: Option<Edges<'_>>) -> (Vec<u32>, u64) {
+    let (whole, sheets) = undivided(light, links);
+    let Some(edges) = edges else { return (whole, 0) };
+    let divide = |&place: &u32| {
+        let (mut found, mut shot, mut waiting) = (Vec::new(), 0, vec![place]);
+        while let Some(place) = waiting.pop() {
+            let element = light.element(place);
+            let (has_edge, rays) = if element.is_patch() { (false, 0) } else { has_edge(light, links, edges, place) };
+            shot += rays;
+            if !has_edge {
+                found.push(place);
+                continue;
+            }
+            for child in element.first_child..element.first_child + element.child_count {
+                if sheets[child as usize].is_some_and(|sheet| sheet.count >= LEAST_LEAVES) {
+                    waiting.push(child);
+                } else {
+                    each_leaf(light.elements, child, |leaf| found.push(leaf));
+                }
+            }
+        }
+        (found, shot)
+    };
+    let divided: Vec<(Vec<u32>, u64)> = whole.par_iter().with_min_len(16).map(divide).collect();
+    let rays = divided.iter().map(|(_, rays)| rays).sum();
+    let mut places: Vec<u32> = divided.into_iter().flat_map(|(places, _)| places).collect();
+    places.sort_unstable();
+    (places, rays)
+}
+
+/// The largest nodes that links and planes allow, in order, and what is in one plane, by node.
+fn undivided<L: LightField>(light: Light<'_, L>, links: &Links) -> (Vec<u32>, Vec<Option<Sheet>>) {
+    let nodes = &light.elements.nodes;
+    let mut linked = vec![false; nodes.len()];
+    for link in links.all() {
+        linked[link.receiver as usize] = true;
+        linked[link.sender as usize] = true;
+    }
+    let mut sheets: Vec<Option<Sheet>> = vec![None; nodes.len()];
+    for node in (0..nodes.len()).rev() {
+        sheets[node] = sheet(light.elements, &sheets, &linked, node as u32);
+    }
+    // Whether a node is a place, or below one.
+    let mut taken = vec![false; nodes.len()];
+    let mut places = Vec::new();
+    for (node, element) in nodes.iter().enumerate() {
+        let is_joined = sheets[node].is_some_and(|sheet| sheet.count >= LEAST_LEAVES);
+        let is_leaf = light.elements.is_patch_leaf(node as u32);
+        taken[node] = node > 0 && taken[element.parent as usize];
+        if !taken[node] && (is_joined || is_leaf) {
+            taken[node] = true;
+            places.push(node as u32);
+        }
+    }
+    (places, sheets)
+}
+
+/// The sheet that a node is, if it is one below which there are no links.
+fn sheet(elements: &Elements, sheets: &[Option<Sheet>], linked: &[bool], node: u32) -> Option<Sheet> {
+    let element = &elements.nodes[node as usize];
+    // Leaves whose light an extension reflects look for themselves; so do those that are partly covered.
+    if element.active || element.kind == Kind::Light || elements.exposed(node) < 1.0 {
+        return None;
+    }
+    if element.is_patch() {
+        return (element.is_flat() && element.child_count == 0).then_some(Sheet { leaf: node, off: 0.0, count: 1 });
+    }
+    let children = element.first_child..element.first_child + element.child_count;
+    let first = sheets[element.first_child as usize]?;
+    let plane = &elements.nodes[first.leaf as usize];
+    let (mut off, mut count) = (first.off, 0);
+    for child in children {
+        let sheet = sheets[child as usize].filter(|_| !linked[child as usize])?;
+        let other = &elements.nodes[sheet.leaf as usize];
+        if plane.normals.axis.dot(other.normals.axis) < FLAT_COSINE {
+            return None;
+        }
+        count += sheet.count;
+        off = off.max(sheet.off + (other.center - plane.center).dot(plane.normals.axis).abs());
+    }
+    (off < IN_PLANE * element.radius).then_some(Sheet { leaf: first.leaf, off, count })
+}
+
+/// Whether the edge of a shadow passes through a place, and the number of rays shot to know: whether it sees a sender in part that
+/// brings much.
+fn has_edge<L: LightField>(light: Light<'_, L>, links: &Links, edges: Edges<'_>, place: u32) -> (bool, u64) {
+    let element = light.element(place);
+    let weight = element.weight(light.element(0).area);
+    let (mut node, mut shot) = (place, 0);
+    loop {
+        for at in links.range(node) {
+            let link = &links.all()[at];
+            let direction = light.direction_to(element.center, link.sender);
+            // Mean absolute difference from the mean, where so much is seen of one and nothing of the other part of it.
+            let off = |seen: f32| weight * edges.means[at] * element.mean_cosine(direction) * 2.0 * seen * (1.0 - seen);
+            if link.visibility < 0.0 || off(0.5) < edges.least {
+                continue;
+            }
+            let sequence = (hash(place, 0xed6e), 0..SEGMENTS);
+            let (seen, all, rays) =
+                visibility(light, place, link.sender, sequence, (&Proof::Unknown, &mut NO_BLOCKER.clone()));
+            shot += u64::from(rays);
+            if all > 0.0 && off(seen / all) > edges.least {
+                return (true, shot);
+            }
+        }
+        if node == 0 {
+            return (false, shot);
+        }
+        node = light.element(node).parent;
+    }
+}
+
+/// A place of many leaves.
+#[derive(Clone, Copy, Debug)]
+struct Joined {
+    node: u32,
+    /// Mean of the leaves' middles by area.
+    middle: Vec3,
+    /// End of its leaves among those of all.
+    end: u32,
+}
+
+/// All places.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Places {
+    /// In order.
+    pub(crate) nodes: Vec<u32>,
+    /// Those of many leaves, in order, and these leaves.
+    joined: Vec<Joined>,
+    leaves: Vec<u32>,
+}
+
+impl Places {
+    /// The places that links allow, and the number of rays shot to find the `edges` of shadows.
+    pub(crate) fn new<L: LightField>(light: Light<'_, L>, links: &Links, edges: Option<Edges<'_>>) -> (Self, u64) {
+        let (nodes, rays) = divided(light, links, edges);
+        let mut places = Self { nodes, ..Self::default() };
+        for &node in places.nodes.iter().filter(|&&node| !light.element(node).is_patch()) {
+            let (mut sum, mut area) = (Vec3::ZERO, 0.0);
+            each_leaf(light.elements, node, |leaf| {
+                places.leaves.push(leaf);
+                sum += light.element(leaf).center * light.element(leaf).area;
+                area += light.element(leaf).area;
+            });
+            let end = places.leaves.len() as u32;
+            places.joined.push(Joined { node, middle: sum / area.max(f32::MIN_POSITIVE), end });
+        }
+        (places, rays)
+    }
+
+    /// The middle of a place.
+    pub(crate) fn middle(&self, elements: &Elements, place: u32) -> Vec3 {
+        let index = self.joined.binary_search_by_key(&place, |joined| joined.node);
+        index.map_or_else(|_| elements.nodes[place as usize].center, |index| self.joined[index].middle)
+    }
+
+    /// Those of many leaves, by position among all.
+    pub(crate) fn joined(&self) -> Vec<usize> {
+        let mut nodes = self.joined.iter().map(|place| place.node).peekable();
+        (0..self.nodes.len()).filter(|&index| nodes.next_if_eq(&self.nodes[index]).is_some()).collect()
+    }
+
+    /// Calls `visit` with each leaf and the position of its place among all; of places of many leaves also with the position among
+    /// these, and where the leaf lies from the middle.
+    pub(crate) fn each_leaf(&self, elements: &Elements, mut visit: impl FnMut(u32, usize, Option<(usize, Vec3)>)) {
+        let (mut joined, mut first) = (self.joined.iter().enumerate().peekable(), 0);
+        for (index, &node) in self.nodes.iter().enumerate() {
+            let Some((at, place)) = joined.next_if(|(_, place)| place.node == node) else {
+                visit(node, index, None);
+                continue;
+            };
+            for &leaf in &self.leaves[first as usize..place.end as usize] {
+                visit(leaf, index, Some((at, elements.nodes[leaf as usize].center - place.middle)));
+            }
+            first = place.end;
+        }
+    }
+
+    /// Places and leaves have the ids that they have after [`Elements::graft`].
+    pub(crate) fn grafted(&mut self) {
+        let joined = self.joined.iter_mut().map(|place| &mut place.node);
+        self.nodes.iter_mut().chain(&mut self.leaves).chain(joined).for_each(|node| *node = grafted(*node));
+    }
+}
+
+/// Calls `visit` with all leaves below a node.
+fn each_leaf(elements: &Elements, node: u32, mut visit: impl FnMut(u32)) {
+    let mut waiting = vec![node];
+    while let Some(node) = waiting.pop() {
+        let element = &elements.nodes[node as usize];
+        if element.child_count == 0 {
+            visit(node);
+        }
+        waiting.extend(element.first_child..element.first_child + element.child_count);
+    }
+}
+
+#[cfg(test)]
+mod tests;
