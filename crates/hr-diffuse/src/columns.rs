@@ -9,7 +9,7 @@ use crate::Rgb;
 use crate::hooks::LightField;
 use crate::links::Links;
 use crate::threads::prelude::*;
-use crate::transport::{Light, NEGLIGIBLE};
+use crate::transport::Light;
 
 /// Of what a leaf does not reflect diffusely, links may carry so much as directional light at first. What the links of a
 /// sender carry errs either way; to cut it off at what is right on average would lose light.
@@ -32,9 +32,7 @@ pub(crate) fn gains<L: LightField>(
         if !light.element(link.sender).active {
             return 0.0;
         }
-        let negligible = NEGLIGIBLE * light.exitant.irradiance[link.receiver as usize].max_element();
-        let power = light.directional_toward(link.sender, link.receiver, (link.factor, negligible));
-        let power = power.max(Rgb::ZERO).element_sum();
+        let power = light.directional_toward(link.sender, link.receiver).max(Rgb::ZERO).element_sum();
         power * link.factor * lit
     });
     let powers: Vec<f32> = powers.collect();

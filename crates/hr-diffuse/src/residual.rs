@@ -51,6 +51,11 @@ impl Residual {
         self.signed / (1.0 - self.indirect).max(0.05)
     }
 
+    /// Whether a relative error may be this one, for all that is known (two standard errors).
+    pub(crate) fn may_be(&self, error: f32) -> bool {
+        (self.error() - error).abs() < 2.0 * self.uncertain * self.error()
+    }
+
     /// Relative L1 error of the solution: what has one sign is repeated by each bounce, the rest averages out.
     pub(crate) fn error(&self) -> f32 {
         let repeated = self.bias();
@@ -291,4 +296,18 @@ fn own_light<L: LightField>(light: Light<'_, L>, leaf: u32) -> Rgb {
 pub(crate) fn diffuse_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> f32 {
     let diffuse = |sender: u32| light.exitant.radiosity[sender as usize] - own_light(light, sender);
     seen_along(light, x, direction, surface).map_or(0.0, |sender| diffuse(sender).max(Rgb::ZERO).element_sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_unclear_within_two_standard_errors() {
+        let found = |absolute, uncertain| Residual { absolute, uncertain, ..Residual::default() };
+        assert!(found(0.09, 0.1).may_be(0.1) && found(0.11, 0.1).may_be(0.1));
+        assert!(!found(0.05, 0.2).may_be(0.1), "it is fine for sure");
+        assert!(!found(0.2, 0.2).may_be(0.1), "it is not for sure");
+        assert!(!found(0.09, 0.01).may_be(0.1), "it is known well");
+    }
 }

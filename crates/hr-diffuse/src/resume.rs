@@ -18,10 +18,8 @@ use std::collections::HashSet;
 const FIRST: [f32; 4] = [12.0, 6.0, 3.0, 1.5];
 /// At least this step is between them.
 const STEP: f32 = 0.6;
-/// A solution is fine enough if its error was found to be below this share of what was asked for: what was found is uncertain.
-const ACCEPTED: f32 = 0.9;
-/// The next pass aims at that, as if the error shrank with the square root of the tolerance, which is halved at least once and so many
-/// times at most, …
+/// The next pass aims at the error asked for, as if the error shrank with the square root of the tolerance, which is halved at least
+/// once and so many times at most, …
 const MOST_HALVES: f32 = 3.0;
 /// … down to this tolerance over the error asked for: where more error is left it does not come from links that are too coarse.
 const FINEST: f32 = 0.25;
@@ -35,7 +33,8 @@ const KNOWN: f32 = 0.1;
 pub(crate) struct Unfinished {
     /// Tolerance that the links there are were made for; infinite before the first pass is done.
     pub(crate) tolerance: f32,
-    /// The relative error that was found then; infinite where nobody has looked since links were made or things moved.
+    /// The relative error that was found then, and a standard error more; infinite where nobody has looked since links were made or
+    /// things moved.
     pub(crate) found: f32,
     /// Whether the last pass found hardly less than the one before, of twice the tolerance.
     pub(crate) in_vain: bool,
@@ -60,18 +59,19 @@ impl Unfinished {
             return Some(next.copied().unwrap_or(self.tolerance));
         }
         let in_vain = self.in_vain && self.tolerance < error;
-        let done = self.found <= ACCEPTED * error || 0.5 * self.tolerance < FINEST * error || in_vain;
+        let done = self.found <= error || 0.5 * self.tolerance < FINEST * error || in_vain;
         // Whole halves, so that what rays happen to find seldom makes another solution.
-        let halves = (2.0 * (self.found / (ACCEPTED * error)).log2()).round().clamp(1.0, MOST_HALVES);
+        let halves = (2.0 * (self.found / error).log2()).round().clamp(1.0, MOST_HALVES);
         (!done).then(|| (self.tolerance * (-halves).exp2()).max(FINEST * error))
     }
 
     /// Takes note of a pass, and of the error that was found after it, if anybody looked.
     pub(crate) fn done(&mut self, tolerance: f32, found: Option<&Residual>) {
         let finer = tolerance <= 0.5 * self.tolerance;
-        let no_better = |found: &Residual| found.error() > NO_BETTER * self.found && found.uncertain < KNOWN;
+        let at_most = |found: &Residual| found.error() * (1.0 + found.uncertain);
+        let no_better = |found: &Residual| at_most(found) > NO_BETTER * self.found && found.uncertain < KNOWN;
         self.in_vain = finer && found.is_some_and(no_better);
-        (self.tolerance, self.found) = (tolerance, found.map_or(f32::INFINITY, Residual::error));
+        (self.tolerance, self.found) = (tolerance, found.map_or(f32::INFINITY, at_most));
     }
 
     /// Looks at pairs with a coarse link as if they had none.
@@ -152,7 +152,7 @@ mod tests {
         assert_eq!(once.len(), firsts.len() + 1, "once to see, and no more: {once:?}");
         assert_eq!(stays.next(0.05), None);
         let mut unknown = Unfinished::new(Vec::new());
-        let tried = passes(0.05, &mut unknown, 1.0, |_| 0.06);
+        let tried = passes(0.05, &mut unknown, 0.3, |_| 0.06);
         assert!(tried.len() > once.len(), "what nobody knows does not end it: {tried:?}");
         assert!(stays.next(0.02).is_some(), "who asks for much less may have it tried");
     }

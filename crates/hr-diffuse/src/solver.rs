@@ -50,8 +50,10 @@ const FEW_ITERATIONS: u32 = 3;
 const CALIBRATE_RAYS: usize = 64;
 /// This share of the rays shot so far is worth knowing what the solution is off by, …
 const CHECK_SHARE: f32 = 0.1;
-/// … from at least and at most so many leaves.
+/// … from at least and at most so many leaves; …
 const CHECKED_LEAVES: [u64; 2] = [64, 2000];
+/// … and once more from so many times as many where that does not tell whether it is fine enough.
+const AGAIN: usize = 4;
 
 /// Exitances and intensities above this are refused: sums of powers and what white surfaces make of them would leave the
 /// range of f32.
@@ -448,17 +450,25 @@ impl<L: LightField> Solver<L> {
         let [least, most] = CHECKED_LEAVES;
         let count = (CHECK_SHARE * self.stats.rays as f32 / RAYS_PER_LEAF as f32) as u64;
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
-        let residual = residual(self.light(), count.clamp(least, most) as usize, &mut || {
-            *stopped = *stopped || watch(&progress).is_break();
-            if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
-        if let Some(residual) = &residual {
+        let count = count.clamp(least, most) as usize;
+        let mut look = |count| {
+            residual(self.light(), count, &mut || {
+                *stopped = *stopped || watch(&progress).is_break();
+                if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+        };
+        let mut found = look(count);
+        if let Some(unclear) = found.filter(|found| found.may_be(self.settings.error)) {
+            // A look costs little beside a pass more.
+            found = look(AGAIN * count).map(|found| Residual { rays: unclear.rays + found.rays, ..found });
+        }
+        if let Some(residual) = &found {
             self.stats.error = Some(residual.error());
             self.stats.bias = -residual.bias();
             self.stats.check_rays += residual.rays;
         }
         self.stats.seconds.check += start.elapsed().as_secs_f64();
-        residual
+        found
     }
 
     /// Begins a new series of iterations: the light is another one.

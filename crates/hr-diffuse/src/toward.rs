@@ -26,12 +26,12 @@ const LEAST_COSINE: f32 = 0.05;
 type Point = (Vec3, Vec3, f32);
 
 impl<L: LightField> Light<'_, L> {
-    /// [`directional`](Self::directional) on the way to a receiver: its mean over both. Senders that bring less than `negligible`
-    /// through a link of this factor are asked for one direction.
-    pub(crate) fn directional_toward(&self, sender: u32, receiver: u32, (factor, negligible): (f32, f32)) -> Rgb {
+    /// [`directional`](Self::directional) on the way to a receiver: its mean over both. Geometry alone decides how closely it is
+    /// looked at, so that light settles.
+    pub(crate) fn directional_toward(&self, sender: u32, receiver: u32) -> Rgb {
         let r = self.element(receiver);
         let away = -self.direction_to(r.center, sender);
-        if !self.varies(sender, (r.center, r.radius), (factor, negligible)) {
+        if !self.is_wide(sender, r.center, r.radius) || self.directional_most(sender) <= 0.0 {
             return self.directional(sender, away);
         }
         let mut points = self.points(receiver);
@@ -45,21 +45,21 @@ impl<L: LightField> Light<'_, L> {
         self.mean_directional(sender, away, &points)
     }
 
-    /// The same on the way to a point with normal `n`: the mean over the sender.
+    /// The same on the way to a point with normal `n`: the mean over the sender. Senders that bring less than `negligible` through
+    /// this form factor are asked for one direction.
     pub(crate) fn directional_at(&self, sender: u32, (x, n): (Vec3, Vec3), (factor, negligible): (f32, f32)) -> Rgb {
         let away = -self.direction_to(x, sender);
-        if !self.varies(sender, (x, 0.0), (factor, negligible)) {
+        if !self.is_wide(sender, x, 0.0) || self.directional_most(sender) * factor <= negligible {
             return self.directional(sender, away);
         }
         self.mean_directional(sender, away, &[(x, n, 1.0)])
     }
 
-    /// Whether a sender's directional light has to be looked at from more than its middle.
-    fn varies(&self, sender: u32, (to, radius): (Vec3, f32), (factor, negligible): (f32, f32)) -> bool {
+    /// Whether a sender and what is within a radius of a point are so near that more than their middles count.
+    fn is_wide(&self, sender: u32, to: Vec3, radius: f32) -> bool {
         let element = self.element(sender);
         let reach = element.radius + radius;
-        let wide = reach * reach > NARROW * NARROW * to.distance_squared(element.center);
-        wide && self.directional_most(sender) * factor > negligible
+        reach * reach > NARROW * NARROW * to.distance_squared(element.center)
     }
 
     /// Points that stand for a node: of parts of surfaces those of a quadrature, of clusters four corners of a box.
@@ -199,14 +199,14 @@ mod tests {
             (1.5, Vec3::new(1.0, 0.0, 1.0), 60.0),
         ] {
             let (solver, nodes @ [sender, receiver]) = squares(aside, axis, exponent);
-            let (light, all) = (solver.light(), (1.0, 0.0));
+            let light = solver.light();
             let truth = brute_force(&solver, nodes, None);
             let (x, n) = (light.element(receiver).center, light.element(receiver).normals.axis);
             let single = light.directional(sender, -light.direction_to(x, sender)).x;
             let off = [
                 (single - truth).abs(),
-                (light.directional_toward(sender, receiver, all).x - truth).abs(),
-                (light.directional_at(sender, (x, n), all).x - brute_force(&solver, nodes, Some(x))).abs(),
+                (light.directional_toward(sender, receiver).x - truth).abs(),
+                (light.directional_at(sender, (x, n), (1.0, 0.0)).x - brute_force(&solver, nodes, Some(x))).abs(),
             ];
             worst.iter_mut().zip(off).for_each(|(worst, off)| *worst = worst.max(off));
         }
@@ -221,8 +221,9 @@ mod tests {
         let (solver, [sender, receiver]) = squares(0.0, Vec3::Z, 30.0);
         let light = solver.light();
         let single = light.directional(sender, Vec3::Z);
-        assert_ne!(light.directional_toward(sender, receiver, (1.0, 0.9)), single);
-        assert_eq!(light.directional_toward(sender, receiver, (1.0, 1.1)), single, "at most 1 is sent");
-        assert!(!light.varies(sender, (Vec3::splat(100.0), 0.5), (1.0, 0.0)));
+        let (x, n) = (light.element(receiver).center, light.element(receiver).normals.axis);
+        assert_ne!(light.directional_at(sender, (x, n), (1.0, 0.9)), single);
+        assert_eq!(light.directional_at(sender, (x, n), (1.0, 1.1)), single, "at most 1 is sent");
+        assert!(light.is_wide(sender, x, 0.5) && !light.is_wide(sender, Vec3::splat(100.0), 0.5));
     }
 }

@@ -88,8 +88,7 @@ impl<L: LightField> Light<'_, L> {
         if self.element(sender).kind == Kind::Light {
             return self.emitted(sender, away);
         }
-        let negligible = NEGLIGIBLE * self.exitant.irradiance[receiver as usize].max_element();
-        self.together(sender, away, self.directional_toward(sender, receiver, (link.factor, negligible)))
+        self.together(sender, away, self.directional_toward(sender, receiver))
     }
 
     /// The diffuse part of [`emitted`](Self::emitted), emission included.
