@@ -63,7 +63,10 @@ proptest! {
                 None => prop_assert!(hits.is_empty(), "{from} to {to} misses {hits:?}"),
                 Some(hit) => {
                     prop_assert_eq!(hit.t, nearest, "{} to {}", from, to);
-                    prop_assert!(hit.point.distance(from + direction * hit.t) < 3e-6, "the hit is on the ray");
+                    let off = hit.point.distance(from + direction * hit.t);
+                    // Rounding across the surface is more along a ray that grazes it.
+                    let cosine = hit.normal.dot(direction.normalize()).abs();
+                    prop_assert!(off < 3e-6 + 1e-7 / cosine, "the hit is on the ray: {} at a cosine of {}", off, cosine);
                     prop_assert_eq!(hit.front, hit.normal.dot(direction) < 0.0, "front is where the normal points");
                 }
             }
