@@ -57,11 +57,27 @@ impl Extent {
 pub fn cpu_seconds() -> f64 {
     #[cfg(unix)]
     {
-        let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-        time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+        seconds(rustix::time::ClockId::ProcessCPUTime)
     }
     #[cfg(not(unix))]
     f64::NAN
+}
+
+/// Seconds of processor time that this thread has used; where the system does not tell, NaN.
+#[must_use]
+pub fn thread_seconds() -> f64 {
+    #[cfg(unix)]
+    {
+        seconds(rustix::time::ClockId::ThreadCPUTime)
+    }
+    #[cfg(not(unix))]
+    f64::NAN
+}
+
+#[cfg(unix)]
+fn seconds(clock: rustix::time::ClockId) -> f64 {
+    let time = rustix::time::clock_gettime(clock);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 /// Solves the diffuse light in a scene on `threads` threads (0: all cores).
