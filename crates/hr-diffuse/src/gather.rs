@@ -8,7 +8,6 @@ use crate::inherited::Carried;
 use crate::kept_weights::KeptWeights;
 use crate::leaf_rows::balance;
 use crate::links::{Link, Links};
-#[cfg(test)]
 use crate::places::Places;
 use crate::push::{self, Push, Spread, Weight, visible};
 use crate::shooting::Shot;
@@ -283,7 +282,6 @@ impl Gather {
     }
 
     /// Where light arrives.
-    #[cfg(test)]
     pub(crate) fn places(&self) -> &Places {
         &self.push.places
     }

@@ -327,7 +327,7 @@ impl Vertices {
 
 impl Stats {
     /// All counters, in the order in which they are kept.
-    fn counters(&mut self) -> [&mut u64; 21] {
+    fn counters(&mut self) -> [&mut u64; 22] {
         let Self {
             polygons,
             nodes,
@@ -359,6 +359,7 @@ impl Stats {
             sealed_sides,
             converged_leaves,
             faint_links,
+            inner_vertices,
             shot_links,
         } = skipped;
         [
@@ -382,6 +383,7 @@ impl Stats {
             sealed_sides,
             converged_leaves,
             faint_links,
+            inner_vertices,
             shot_links,
         ]
     }
@@ -402,7 +404,7 @@ impl Stats {
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
         let mut stats = Self::default();
-        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 21>(WHAT)?) {
+        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 22>(WHAT)?) {
             *counter = kept;
         }
         let [iterations, stopped, spent] = from.take_exactly::<u64, 3>(WHAT)?;

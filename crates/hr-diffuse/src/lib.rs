@@ -62,6 +62,7 @@ mod transport;
 mod twins;
 pub mod vertices;
 pub mod visibility;
+mod within;
 
 pub use budget::{Budget, Spent};
 pub use cone::Cone;

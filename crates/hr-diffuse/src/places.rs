@@ -206,6 +206,11 @@ impl Places {
         (0..self.nodes.len()).filter(|&index| nodes.next_if_eq(&self.nodes[index]).is_some()).collect()
     }
 
+    /// The leaves of these.
+    pub(crate) fn leaves_of_joined(&self) -> &[u32] {
+        &self.leaves
+    }
+
     /// Calls `visit` with each leaf and the position of its place among all; of places of many leaves also with the position among
     /// these, and where the leaf lies from the middle.
     pub(crate) fn each_leaf(&self, elements: &Elements, mut visit: impl FnMut(u32, usize, Option<(usize, Vec3)>)) {

@@ -9,13 +9,15 @@ use crate::gather::{Group, carried, share};
 use crate::hooks::LightField;
 use crate::inherited::{Above, inherit};
 use crate::links::{Link, Links};
+use crate::places::Places;
 use crate::push::{Spread, spreads};
-use crate::rows::{Correction, Row, look_around};
+use crate::rows::{self, Correction, Row, look_around};
 use crate::sampling::hash;
 use crate::segments::visibility_at;
 use crate::threads::{self, prelude::*};
 use crate::transport::{Light, NEGLIGIBLE};
 use crate::vertices::{Vertices, outlines, point_on};
+use crate::within::Within;
 use crate::{Facing, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
@@ -29,6 +31,8 @@ const MOST_RAYS: f32 = 24.0;
 /// that looked wholly visible or hidden.
 const PARTIAL_SHARE: f32 = 0.002;
 const WHOLE_SHARE: f32 = 0.01;
+/// Where it is proved how much is seen of senders that take up this share of the view there is nothing to look around for.
+const ALL_PROVED: f32 = 0.97;
 /// What is nearer to a vertex than this share of its leaf's radius, all around, covers it.
 const COVER: f32 = 0.25;
 /// Vertices are changed by no more than this factor to agree with their leaves.
@@ -36,26 +40,35 @@ const MOST_CHANGE: f64 = 1.5;
 /// Vertices that a thread gathers between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 128;
 
-/// Builds the vertices of a solution with a relative error and gathers their irradiance. Returns them and the number of rays shot.
-/// `watch` is told the share that is done; once it breaks, the others take the mean irradiance of the leaves around.
+/// What the values at vertices took.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Cost {
+    pub(crate) rays: u64,
+    /// Vertices that gather nothing, as they lie within places.
+    pub(crate) within: u64,
+}
+
+/// Builds the vertices of a solution with a relative error, which has links to `places` of many leaves where these are known, and
+/// gathers their irradiance. `watch` is told the share that is done; once it breaks, the others take the mean irradiance of the leaves around.
 pub(crate) fn reconstruct<L: LightField>(
     light: Light<'_, L>,
-    links: &Links,
+    (links, joined): (&Links, Option<&Places>),
     error: f32,
     watch: &mut dyn FnMut(f32) -> ControlFlow<()>,
-) -> (Vertices, u64) {
+) -> (Vertices, Cost) {
     let contacts = Contacts::new(light.scene, light.elements);
     let mut layout = outlines(light.scene, light.elements);
     contacts.cut(light.elements, &mut layout);
     let mut vertices = layout.fans(light.scene, light.elements);
     let places = contacts.places(light.elements, &vertices);
     let count = vertices.positions.len();
+    let within = joined.map_or_else(|| Within::none(&vertices), |joined| Within::new(light, joined, &vertices));
     let mut rays = 0;
     let chunk = BETWEEN_WATCHES * threads::current_num_threads();
     let mut covered = Vec::with_capacity(count);
     let shares = light.reflected_shares();
     let (spreads, _) = spreads(light, links, Some(error));
-    let (from_afar, near) = inherited(light, (links, &spreads, &shares), (&vertices, &places));
+    let (from_afar, near) = inherited(light, (links, &spreads, &shares), (&vertices, &places, &within));
     let mut indirect: Vec<f32> = Vec::with_capacity(count);
     for start in (0..count).step_by(chunk) {
         if watch(start as f32 / count as f32).is_break() {
@@ -76,6 +89,16 @@ pub(crate) fn reconstruct<L: LightField>(
                 let around = vertices.leaves_around(vertex as u32);
                 if around.iter().all(|&leaf| light.element(leaf).importance <= 0.0) {
                     return Gathering::default();
+                }
+                if within.holds(vertex as u32) {
+                    let indirect: f32 = around.iter().map(|&leaf| light.exitant.indirect[leaf as usize]).sum();
+                    let irradiance: Rgb = around.iter().map(|&leaf| light.exitant.irradiance[leaf as usize]).sum();
+                    let count = around.len() as f32;
+                    return Gathering {
+                        irradiance: irradiance / count,
+                        indirect: indirect / count,
+                        ..Gathering::default()
+                    };
                 }
                 let (afar, seed) = (&from_afar[vertex], seed(vertices.positions[vertex]));
                 let gather = |place: (u32, Vec2)| {
@@ -102,7 +125,8 @@ pub(crate) fn reconstruct<L: LightField>(
     }
     agree(light, &mut vertices, &indirect);
     uncover(&mut vertices, &covered);
-    (vertices, rays)
+    within.fill(&light.exitant.irradiance, &mut vertices);
+    (vertices, Cost { rays, within: within.count() })
 }
 
 /// What vertices gather of reflected light, with links made for something larger, is made to agree with what the leaves around have,
@@ -201,12 +225,15 @@ fn gather_at<L: LightField>(
     let [_, emitters, rest] = inherited.map(|brought| brought.share);
     let (mut rays, mut row) = (0, Row { emitters, own: 0.0, inherited: rest });
     let mut known_here: SmallVec<[u32; 64]> = SmallVec::new();
+    // Share of the view through links of which it is proved how much they let through.
+    let mut proved = 0.0;
     for Arriving { irradiance, share: view, mut visibility, sender } in arriving {
         let share = irradiance.max_element() / total;
         let partial = visibility > 0.0 && visibility < 1.0;
         let renewed = visibility >= 0.0 && share > if partial { PARTIAL_SHARE } else { WHOLE_SHARE };
         // What is proved of a link holds everywhere.
         let known = renewed || visibility < 0.0;
+        proved += if visibility < 0.0 { view } else { 0.0 };
         if known {
             known_here.push(sender);
         }
@@ -228,12 +255,17 @@ fn gather_at<L: LightField>(
     }
     known_here.sort_unstable();
     let is_own = |sender: u32| known_here.binary_search(&sender).is_ok();
-    let seen = look_around(light, (x, n, element.source), seed, COVER * element.radius, is_own);
-    let Correction { inherited, rest, all } = row.correction(&seen);
+    let (Correction { inherited, rest, all }, covered) = if proved >= ALL_PROVED {
+        (row.limit(), false)
+    } else {
+        rays += rows::RAYS;
+        let seen = look_around(light, (x, n, element.source), seed, COVER * element.radius, is_own);
+        (row.correction(&seen), seen.covered)
+    };
     let irradiance = own[0] + kept[0] + (own[1] + kept[1] + (own[2] + kept[2] * inherited) * rest) * all;
     let [known, others] = reflected;
     let indirect = (known[1] + others[1] + (known[2] + others[2] * inherited) * rest) * all;
-    Gathering { irradiance, indirect, rays, covered: seen.covered }
+    Gathering { irradiance, indirect, rays, covered }
 }
 
 /// Where the random numbers of a vertex begin: those of vertices in the same place, on both sides of a cut, are the same.
@@ -301,7 +333,7 @@ impl Near {
 fn inherited<L: LightField>(
     light: Light<'_, L>,
     (links, spreads, shares): (&Links, &[Spread], &[f32]),
-    (vertices, places): (&Vertices, &[Vec2]),
+    (vertices, places, within): (&Vertices, &[Vec2], &Within),
 ) -> (Vec<[Brought; 3]>, Near) {
     let brought = |(link, &spread): (&Link, &Spread)| {
         if !is_inherited(light, link.receiver, spread) {
@@ -313,7 +345,8 @@ fn inherited<L: LightField>(
     };
     let carried: Vec<Brought> = links.all().par_iter().zip(spreads).map(brought).collect();
     let groups: Vec<Group> = links.all().par_iter().map(|link| Group::of(light, link.sender)).collect();
-    let mut of_leaf: Vec<(u32, u32)> = vertices.leaf.iter().copied().zip(0..).collect();
+    let mut of_leaf: Vec<(u32, u32)> =
+        vertices.leaf.iter().copied().zip(0..).filter(|&(_, vertex)| !within.holds(vertex)).collect();
     of_leaf.par_sort_unstable();
     let above = Above { links, spreads, groups: &groups, carried: &carried };
     let found = inherit(
@@ -387,7 +420,7 @@ mod tests {
         let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         let mean = |solver: &Solver, links: &Links| {
-            let (vertices, _) = reconstruct(solver.light(), links, 0.05, &mut |_| ControlFlow::Continue(()));
+            let (vertices, _) = reconstruct(solver.light(), (links, None), 0.05, &mut |_| ControlFlow::Continue(()));
             vertices.irradiance.iter().map(|irradiance| irradiance.x).sum::<f32>() / vertices.irradiance.len() as f32
         };
         let right = mean(&solver, &solver.links);

@@ -14,6 +14,8 @@ use glam::{Vec2, Vec3};
 
 /// Sides of the grid of directions that is drawn from at each point.
 const GRID: u32 = 7;
+/// Rays of a look around.
+pub(crate) const RAYS: u32 = GRID * GRID;
 /// A share of the view that is neither none nor all is known to within this: about twice the standard error of
 /// stratified rays.
 const UNCERTAIN: f32 = 0.05;
@@ -42,7 +44,6 @@ pub(crate) fn look_around<L: LightField>(
     near: f32,
     own: impl Fn(u32) -> bool,
 ) -> Seen {
-    const RAYS: u32 = GRID * GRID;
     let (mut hits, mut close) = ([0_u32; 3], 0);
     for cell in 0..RAYS {
         let jitter = point2(hash(seed, 0x2f1b), cell);
@@ -112,6 +113,12 @@ impl Default for Correction {
 }
 
 impl Row {
+    /// What keeps this row from being more than all there is to see.
+    pub(crate) fn limit(&self) -> Correction {
+        let all = (self.emitters + self.own + self.inherited).max(1.0).recip();
+        Correction { all, ..Correction::default() }
+    }
+
     /// What makes this row what was seen: what is uncertain changes first, and emitters, whose links are fine, only where
     /// they take up more than all there is, or less where there is nothing else.
     pub(crate) fn correction(&self, seen: &Seen) -> Correction {

@@ -15,6 +15,8 @@ pub(crate) struct Skips {
     pub(crate) converged_leaves: bool,
     /// A look from each leaf at links that bring next to nothing.
     pub(crate) faint_links: bool,
+    /// Values at vertices within places of many leaves.
+    pub(crate) inner_vertices: bool,
     /// Directional detail that makes no difference to what links carry.
     pub(crate) negligible_detail: bool,
 }
@@ -28,6 +30,7 @@ impl Skips {
         sealed_sides: true,
         converged_leaves: true,
         faint_links: true,
+        inner_vertices: true,
         negligible_detail: true,
     };
 }

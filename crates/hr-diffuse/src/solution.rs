@@ -50,19 +50,22 @@ impl<L: LightField> Solver<L> {
         let error = self.settings.error;
         let mut stopped = false;
         // A solution that was kept, and left as it was, knows it already.
-        if self.gather.is_for(&self.links) {
+        let known = self.gather.is_for(&self.links);
+        if known {
             for (leaf, indirect) in self.gather.indirect(self.light(), &self.links) {
                 self.exitant.indirect[leaf as usize] = indirect;
             }
         }
-        let (vertices, rays) = reconstruct(self.light(), &self.links, error, &mut |share| {
+        let places = Some(self.gather.places()).filter(|_| known && self.skips.inner_vertices);
+        let (vertices, cost) = reconstruct(self.light(), (&self.links, places), error, &mut |share| {
             let answer =
                 watch(&Progress { phase: Phase::Reconstruct, fraction: 0.9 + 0.1 * share, error, links, nodes });
             stopped |= answer.is_break();
             answer
         });
         self.stats.stopped |= stopped;
-        self.stats.vertex_rays += rays;
+        self.stats.vertex_rays += cost.rays;
+        self.stats.skipped.inner_vertices = cost.within;
         self.stats.seconds.reconstruct += start.elapsed().as_secs_f64();
         Solution {
             scene: self.scene,

@@ -69,6 +69,8 @@ pub struct Skipped {
     pub converged_leaves: u64,
     /// Links that bring so little that leaves do not look for themselves what they bring there.
     pub faint_links: u64,
+    /// Vertices that gather nothing, as they lie within a place of many leaves that gathered for them.
+    pub inner_vertices: u64,
     /// Links over which nothing was shot in an iteration, as their senders had next to no unshot light.
     pub shot_links: u64,
 }
@@ -83,6 +85,7 @@ impl std::ops::AddAssign for Skipped {
         self.sealed_sides += other.sealed_sides;
         self.converged_leaves += other.converged_leaves;
         self.faint_links += other.faint_links;
+        self.inner_vertices += other.inner_vertices;
         self.shot_links += other.shot_links;
     }
 }

@@ -69,6 +69,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "sealed_sides": skipped.sealed_sides,
             "converged_leaves": skipped.converged_leaves,
             "faint_links": skipped.faint_links,
+            "inner_vertices": skipped.inner_vertices,
             "shot_links": skipped.shot_links,
             "negligible_detail": solution.field.counters().negligible_detail(),
         },
