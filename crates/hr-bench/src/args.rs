@@ -42,6 +42,8 @@ pub enum Command {
     Paper(PaperArgs),
     /// Time of frames along a walk, over the share of glossy vertices and the tolerance of their renewal: Markdown tables
     View(ViewArgs),
+    /// The pictures of the guide in docs/, made anew
+    Guide(GuideArgs),
 }
 
 /// Of `hr-bench reference`.
@@ -274,6 +276,18 @@ pub struct PaperArgs {
     /// Where paper-tables.md and its pictures go
     #[arg(long, value_name = "DIR", default_value = "target/hr-bench")]
     pub out: PathBuf,
+}
+
+/// Of `hr-bench guide`.
+#[derive(Clone, Debug, PartialEq, Eq, Args)]
+pub struct GuideArgs {
+    /// Where guide-errors.png, guide-point.png and guide-modes.png go
+    #[arg(long, value_name = "DIR", default_value = "target/hr-bench")]
+    pub out: PathBuf,
+
+    /// Paths per pixel of the path-traced picture
+    #[arg(long, value_name = "N", default_value_t = 256)]
+    pub spp: u32,
 }
 
 /// Of `hr-bench view`.

@@ -16,6 +16,7 @@
 //! | `visibility` | rays per second, and links that need none |
 //! | `paper` | what the paper's tables and figures compare |
 //! | `view` | time of frames along a walk |
+//! | `guide` | nothing: it makes the guide's pictures |
 
 pub mod accuracy;
 pub mod args;
@@ -28,11 +29,13 @@ pub mod float_image;
 pub mod form_factors;
 pub mod frames;
 pub mod growth;
+pub mod guide;
 pub mod irradiance;
 pub mod measure;
 pub mod paper;
 pub mod plot;
 pub mod run;
+mod side_by_side;
 pub mod threads;
 pub mod transport;
 pub mod views;

@@ -5,8 +5,9 @@
 //! of its solid angle ([`Incident::extent`]), or the square that it is ([`Incident::contour`]). Nothing lies between light and plate, so that all there is to see of the
 //! convergence is the samples'.
 
-use super::{Page, percent, side_by_side};
+use super::{Page, percent};
 use crate::BenchError;
+use crate::side_by_side::side_by_side;
 use glam::{DVec3, Vec3};
 use glossy_ext::{Contour, Incident, Place, Reflector, Ward};
 use hr_diffuse::Shape;

@@ -1,10 +1,11 @@
 //! Table 2 and figure 7: the adaptive Haar basis against the non-adaptive one, and spherical harmonics.
 
 use super::leaves::{Leaf, distance, glossy_leaves, reflect, solve};
-use super::{Page, percent, relative, side_by_side};
+use super::{Page, percent, relative};
 use crate::BenchError;
 use crate::curve::time_at;
 use crate::run::camera;
+use crate::side_by_side::side_by_side;
 use glossy_ext::basis::{Harmonics, Level, NonAdaptive, Order, Window};
 use glossy_ext::haar::{Haar, Refinement, Refiner};
 use glossy_ext::{Basis, GlossyField, Reflector};
