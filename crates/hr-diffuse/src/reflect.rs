@@ -99,8 +99,9 @@ impl Senders {
         let mut leaves: Vec<Standing> = Vec::with_capacity(self.standing.len());
         for (node, element) in elements.nodes.iter().enumerate() {
             let standing = self.of(node as u32);
-            // As if they divided the cone of normals among them. Most normals of a single leaf are nearer to its own.
-            let share = if element.child_count == 0 { 0.5 } else { (standing.len() as f32).sqrt().recip() };
+            // As if they divided the cone of normals among them. Were they blurred less, the lobes of neighbours would leave gaps
+            // between them, which show as blots where a sphere lights a floor.
+            let share = (standing.len() as f32).sqrt().recip();
             let spread = (element.normals.angle() * share).max(0.0);
             leaves.extend(standing.iter().map(|&(leaf, _)| Standing { leaf, spread, negligible: 0.0 }));
         }
@@ -150,6 +151,7 @@ fn thinned(all: Vec<(u32, f32)>, seed: u32) -> Representatives {
 impl<L: LightField> Solver<L> {
     /// Reflects light that arrived at senders, until `watch` breaks: all of it where it has changed, or what is new.
     pub(crate) fn reflect_senders(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) {
+        self.shown.clear();
         if !self.elements.nodes[0].active {
             return;
         }
@@ -254,7 +256,6 @@ impl<L: LightField> Solver<L> {
         new: Option<&[Rgb]>,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Vec<u32> {
-        let elements = &self.elements;
         let tolerance = self.settings.error * if new.is_some() { NEW_SHARE } else { REFLECT_SHARE };
         let mut changed: Vec<Standing> = leaves
             .iter()
@@ -269,6 +270,24 @@ impl<L: LightField> Solver<L> {
             })
             .collect();
         self.stats.skipped.converged_leaves += (leaves.len() - changed.len()) as u64;
+        let exitant = self.exitant_of(&changed, new, watch);
+        changed.truncate(exitant.len());
+        for (Standing { leaf, negligible, .. }, exitant) in changed.iter().zip(exitant) {
+            self.reflected[*leaf as usize] = exitant;
+            self.last_negligible[*leaf as usize] = *negligible;
+            self.last_reflected[*leaf as usize] = self.exitant.irradiance[*leaf as usize];
+        }
+        changed.into_iter().map(|standing| standing.leaf).collect()
+    }
+
+    /// What the extension makes of the incident light of leaves, in order, until `watch` breaks.
+    fn exitant_of(
+        &self,
+        leaves: &[Standing],
+        new: Option<&[Rgb]>,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Vec<L::Exitant> {
+        let elements = &self.elements;
         let reflect = |&Standing { leaf, spread, negligible }: &Standing| {
             let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
             let mut node = leaf;
@@ -282,29 +301,22 @@ impl<L: LightField> Solver<L> {
             let diffuse = irradiance * element.reflectance * FRAC_1_PI;
             self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse, spread, negligible })
         };
-        let mut exitant: Vec<L::Exitant> = Vec::with_capacity(changed.len());
-        for part in changed.chunks(BETWEEN_WATCHES * threads::current_num_threads()) {
+        let mut exitant: Vec<L::Exitant> = Vec::with_capacity(leaves.len());
+        for part in leaves.chunks(BETWEEN_WATCHES * threads::current_num_threads()) {
             if watch().is_break() {
                 break;
             }
             exitant.par_extend(part.par_iter().map(reflect));
         }
-        changed.truncate(exitant.len());
-        for (Standing { leaf, negligible, .. }, exitant) in changed.iter().zip(exitant) {
-            self.reflected[*leaf as usize] = exitant;
-            self.last_negligible[*leaf as usize] = *negligible;
-            self.last_reflected[*leaf as usize] = self.exitant.irradiance[*leaf as usize];
-        }
-        changed.into_iter().map(|standing| standing.leaf).collect()
+        exitant
     }
 
     /// Reflects the incident light of all leaves once more, of those too whose light no link asked for or was carried as
-    /// diffuse light: the final reflection of all accumulated samples (paper, section 3.4), for display by distributions.
-    /// Where `watch` breaks, the rest stays as it is.
+    /// diffuse light: the final reflection of all accumulated samples (paper, section 3.4), for display by distributions, from
+    /// [`finish`](Self::finish) on; light goes on between elements by what stands for many. Where `watch` breaks, the rest is
+    /// shown as it is.
     pub fn reflect_for_display(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let start = std::time::Instant::now();
-        self.last_reflected.resize(self.elements.nodes.len(), Rgb::splat(f32::NEG_INFINITY));
-        self.last_negligible.resize(self.elements.nodes.len(), 0.0);
         let shown = SHOWN_SHARE * self.settings.error * self.mean_irradiance() * FRAC_1_PI;
         let negligible = if self.skips.negligible_detail { shown } else { 0.0 };
         let active = |leaf: &u32| self.elements.nodes[*leaf as usize].active;
@@ -314,20 +326,17 @@ impl<L: LightField> Solver<L> {
             .filter(active)
             .map(|leaf| Standing { leaf, spread: self.bend(leaf), negligible })
             .collect();
-        // Those that stood for others are to show their own detail now.
-        for Standing { leaf, .. } in &leaves {
-            self.last_reflected[*leaf as usize] = Rgb::splat(f32::NEG_INFINITY);
-        }
         let progress = self.progress(Phase::Transport, 0.9);
         let (mut done, mut stopped) = (0, false);
         let chunk = BETWEEN_WATCHES * threads::current_num_threads();
-        self.reflect(&leaves, None, &mut || {
+        let exitant = self.exitant_of(&leaves, None, &mut || {
             let share = (done as f32 / leaves.len() as f32).min(1.0);
             done += chunk;
             let answer = watch(&Progress { fraction: progress.fraction + 0.04 * share, ..progress });
             stopped |= answer.is_break();
             answer
         });
+        self.shown = leaves.into_iter().map(|standing| standing.leaf).zip(exitant).collect();
         self.stats.stopped |= stopped;
         self.stats.seconds.reflect += start.elapsed().as_secs_f64();
     }

@@ -56,6 +56,13 @@ impl<L: LightField> Solver<L> {
                 self.exitant.indirect[leaf as usize] = indirect;
             }
         }
+        // What is shown of flat leaves is what they send, in more detail; curved ones send more blurred, as far as their normals reach.
+        let (flat, curved): (Vec<_>, Vec<_>) = std::mem::take(&mut self.shown)
+            .into_iter()
+            .partition(|(leaf, _)| self.elements.nodes[*leaf as usize].is_flat());
+        for (leaf, exitant) in flat {
+            self.reflected[leaf as usize] = exitant;
+        }
         let places = Some(self.gather.places()).filter(|_| known && self.skips.inner_vertices);
         let (vertices, cost) = reconstruct(self.light(), (&self.links, places), error, &mut |share| {
             let answer =
@@ -66,6 +73,9 @@ impl<L: LightField> Solver<L> {
         self.stats.stopped |= stopped;
         self.stats.vertex_rays += cost.rays;
         self.stats.skipped.inner_vertices = cost.within;
+        for (leaf, exitant) in curved {
+            self.reflected[leaf as usize] = exitant;
+        }
         self.stats.seconds.reconstruct += start.elapsed().as_secs_f64();
         Solution {
             scene: self.scene,

@@ -167,6 +167,8 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) last_reflected: Vec<Rgb>,
     /// What was negligible of it then ([`Arrived::negligible`](crate::hooks::Arrived)).
     pub(crate) last_negligible: Vec<f32>,
+    /// Directional light of leaves as it is to be shown: in its own detail, also where it stands for others.
+    pub(crate) shown: Vec<(u32, L::Exitant)>,
     /// What has been shot, while light is.
     pub(crate) shot: Option<Shot>,
     /// What links may carry of directional light: see [`columns`](crate::columns).
@@ -252,6 +254,7 @@ impl<L: LightField> Solver<L> {
             strong,
             last_reflected: Vec::new(),
             last_negligible: Vec::new(),
+            shown: Vec::new(),
             shot: None,
             most_reflected: FREELY,
             brightest: Vec::new(),
@@ -617,6 +620,7 @@ impl<L: LightField> Solver<L> {
     /// leaf itself.
     pub(crate) fn prepare(&mut self, tolerance: Option<f32>, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         let start = Instant::now();
+        self.shown.clear();
         let error = tolerance.map(|tolerance| if self.skips.faint_links { tolerance } else { 0.0 });
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
         let known = tolerance.and_then(|_| self.kept_weights.take());

@@ -150,3 +150,27 @@ impl Solved {
         Ok((solved, Accuracy { asked: settings.error, believed }))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+    use glossy_ext::Lambert;
+
+    /// The light between elements comes from what stands for many normals, however detailed curved leaves are shown.
+    #[test]
+    fn light_at_vertices_does_not_depend_on_what_is_shown() {
+        let mut scene = Scene::load("glossy-sphere").expect("built in");
+        let floor = scene.materials.iter_mut().find(|material| material.name == "floor").expect("a floor");
+        floor.reflector = Arc::new(Lambert::new(Vec3::splat(0.5)).expect("a reflectance"));
+        let scene = Arc::new(scene);
+        let [shown, not] = [true, false].map(|distributions| {
+            let watch = &mut |_: &_| ControlFlow::Continue(());
+            let settings = Settings::with_error(0.3);
+            Solved::new(scene.clone(), settings, distributions, watch).expect("a sound scene").solution
+        });
+        let [all, some] = [&shown, &not].map(|it| it.reflected.iter().filter(|light| !light.is_empty()).count());
+        assert!(all > some && some > 0, "{all} leaves have distributions, {some} send light");
+        assert_eq!(shown.vertices.irradiance, not.vertices.irradiance, "light at vertices");
+    }
+}
