@@ -9,13 +9,14 @@ use crate::exposed::is_touched;
 use crate::geometry::{Domain, FACETS, Facet, Geometry};
 use crate::hooks::{FLAT_COSINE, Hierarchy, NodeId};
 use crate::moved::Moved;
+use crate::rooms::{self, NO_ROOM, Rooms};
 use crate::scene::{Light, LightKind};
 use crate::sealed::{Side, is_back, lit_sides};
 use crate::skips::Skips;
 use crate::threads::prelude::*;
 use crate::visibility::Visibility;
 use crate::{Cone, DiffuseMaterial, Facing, Rgb, SurfaceReflectance};
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{Vec2, Vec3};
 use obvhs::BvhBuildParams;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use smallvec::SmallVec;
@@ -81,6 +82,8 @@ pub struct Element {
     pub importance: f32,
     /// Index into [`Elements::facets`] of parts of curved surfaces that are no whole spheres; else `u32::MAX`.
     pub facets: u32,
+    /// The [room](crate::rooms) that all of the node is in, [`ROOMS`](crate::rooms::ROOMS) or [`NO_ROOM`].
+    pub(crate) room: u32,
 }
 
 impl Element {
@@ -189,6 +192,8 @@ pub struct Elements {
     pub(crate) touched: Vec<[bool; 2]>,
     /// By node: see [`exposed`](Self::exposed).
     pub(crate) exposed: Vec<f32>,
+    /// Those that there were when the hierarchy was built.
+    pub(crate) rooms: Rooms,
 }
 
 struct Boxed(obvhs::aabb::Aabb);
@@ -204,18 +209,22 @@ impl Elements {
     pub(crate) fn build(scene: &SceneData, extra: impl Fn(u32) -> Option<Rgb>, skips: Skips) -> Self {
         let mut roots: Vec<Element> = Vec::new();
         let mut sealed = vec![[false; 2]; scene.surfaces().len()];
-        for (i, sides) in sides(scene, &extra, skips).into_iter().enumerate() {
+        let (sides, rooms) = sides(scene, &extra, skips);
+        for (i, sides) in sides.into_iter().enumerate() {
             let glossy = extra(scene.surface_materials[i]);
-            let side = |(kind, _)| patch(scene, i as u32, kind, Domain::WHOLE, glossy);
-            roots.extend(SIDES.into_iter().zip(sides.shown).filter(|(_, shown)| *shown).map(side));
+            let side = |((kind, _), room)| Element { room, ..patch(scene, i as u32, kind, Domain::WHOLE, glossy) };
+            let shown = SIDES.into_iter().zip(sides.shown).zip(sides.rooms).filter(|((_, shown), _)| *shown);
+            roots.extend(shown.map(side));
             sealed[i] = sides.sealed;
         }
-        // Fronts and backs in trees of their own: what a cluster faces is then known better.
-        let (fronts, backs): (Vec<Element>, Vec<Element>) = roots.into_iter().partition(|e| e.kind == Kind::Front);
+        let (mut inside, rest): (Vec<Element>, Vec<Element>) = roots.into_iter().partition(|e| e.room != NO_ROOM);
+        // Rooms in trees of their own: no cluster is in several of them but those that hold nothing else.
+        inside.sort_by_key(|element| element.room);
+        let of_room = |room: &[Element]| Tree::over(Tree::of_sides(room.to_vec()));
+        let of_rooms: Vec<Tree> = inside.chunk_by(|a, b| a.room == b.room).filter_map(of_room).collect();
         let lights: Vec<Element> = (0..scene.lights.len()).map(|i| light(scene, i as u32)).collect();
-        let mut trees: Vec<Tree> = Vec::new();
-        trees.extend(Tree::build(fronts));
-        trees.extend(Tree::build(backs));
+        let mut trees: Vec<Tree> = Tree::over(of_rooms).into_iter().collect();
+        trees.extend(Tree::of_sides(rest));
         trees.extend(lights.into_iter().map(Tree::Leaf));
         let root = if trees.len() == 1 { trees.remove(0) } else { Tree::Inner(trees) };
         let mut elements = Self {
@@ -225,6 +234,7 @@ impl Elements {
             sealed,
             touched: Vec::new(),
             exposed: Vec::new(),
+            rooms,
         };
         elements.flatten(root);
         for (surface, &twin) in scene.twins.iter().enumerate() {
@@ -236,6 +246,11 @@ impl Elements {
         elements.touched = vec![[false; 2]; scene.surfaces().len()];
         elements.find_touched(scene, |_| true);
         elements
+    }
+
+    /// Area that a receiver's counts a share of: of all surfaces in a single room, of those of one among several.
+    pub(crate) fn measure(&self) -> f32 {
+        (self.nodes[0].area / self.rooms.number.powi(2)).max(f32::MIN_POSITIVE)
     }
 
     /// Finds the touched sides anew, those of some surfaces.
@@ -336,6 +351,7 @@ impl Elements {
         let range = cluster.first_child as usize..(cluster.first_child + cluster.child_count) as usize;
         let children = || self.nodes[range.clone()].iter().filter(|c| c.kind != Kind::Light);
         let mut normals: Option<Cone> = None;
+        cluster.room = children().map(|child| child.room).reduce(rooms::together).unwrap_or(NO_ROOM);
         let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
         for child in children() {
             low = low.min(child.bounds[0]);
@@ -388,7 +404,9 @@ impl Elements {
         skips: Skips,
     ) -> Vec<Element> {
         let mut found = Vec::new();
-        for (i, sides) in sides(scene, &extra, skips).into_iter().enumerate() {
+        // What was in one room may not be now.
+        self.nodes.iter_mut().for_each(|element| element.room = NO_ROOM);
+        for (i, sides) in sides(scene, &extra, skips).0.into_iter().enumerate() {
             let glossy = extra(scene.surface_materials[i]);
             for ((kind, shown), node) in SIDES.into_iter().zip(sides.shown).zip(self.surface_nodes[i]) {
                 if shown && node == u32::MAX {
@@ -403,7 +421,7 @@ impl Elements {
     /// Adds sides beside all that there is: below a new root are the old one and a tree of them. Nodes there are have other
     /// ids then: see [`grafted`].
     pub(crate) fn graft(&mut self, scene: &SceneData, sides: Vec<Element>) {
-        let Some(tree) = Tree::build(sides) else { return };
+        let Some(tree) = Tree::of(sides) else { return };
         for element in &mut self.nodes {
             element.parent = grafted(element.parent);
             element.first_child = if element.child_count > 0 { grafted(element.first_child) } else { 0 };
@@ -475,6 +493,7 @@ impl Elements {
             let mut child = patch(scene, parent.source, parent.kind, *part, None);
             child.parent = node;
             child.active = parent.active;
+            child.room = parent.room;
             child.importance = if parent.active { parent.importance } else { child.reflectance.max_element() };
             self.nodes.push(child);
             self.add_facets(scene, self.nodes.len() - 1);
@@ -534,6 +553,7 @@ const EMPTY: Element = Element {
     facets: u32::MAX,
     whole_sphere: false,
     convex: false,
+    room: NO_ROOM,
 };
 
 /// The root of what [`Elements::graft`] adds.
@@ -561,13 +581,19 @@ struct Sides {
     shown: [bool; 2],
     /// Whether it has none because no light can reach it, which it would reflect.
     sealed: [bool; 2],
+    /// The room that it is in.
+    rooms: [u32; 2],
 }
 
 /// What becomes of the sides of all surfaces.
-fn sides(scene: &SceneData, extra: &impl Fn(u32) -> Option<Rgb>, skips: Skips) -> Vec<Sides> {
+fn sides(scene: &SceneData, extra: &impl Fn(u32) -> Option<Rgb>, skips: Skips) -> (Vec<Sides>, Rooms) {
     let idle = idle(scene, extra);
-    let lit = if skips.sealed_sides { lit_sides(scene, &idle) } else { vec![[true; 2]; idle.len()] };
-    let of_surface = |(i, [front, back]): (usize, [bool; 2])| {
+    let (lit, rooms, of_sides) = if skips.sealed_sides {
+        lit_sides(scene, &idle)
+    } else {
+        (vec![[true; 2]; idle.len()], Rooms::ONE, vec![[NO_ROOM; 2]; idle.len()])
+    };
+    let of_surface = |((i, [front, back]), rooms): ((usize, [bool; 2]), [u32; 2])| {
         if scene.is_twin(i as u32) {
             return Sides::default();
         }
@@ -576,9 +602,9 @@ fn sides(scene: &SceneData, extra: &impl Fn(u32) -> Option<Rgb>, skips: Skips) -
         let material = scene.surface_materials[i];
         let reflects = || scene.reflectance(i as u32, &Domain::WHOLE) + extra(material).unwrap_or(Rgb::ZERO);
         let has_back = scene.materials[material as usize].two_sided && reflects().max_element() > 0.0;
-        Sides { shown: [front, has_back && back], sealed: [!front, has_back && !back] }
+        Sides { shown: [front, has_back && back], sealed: [!front, has_back && !back], rooms }
     };
-    lit.into_iter().enumerate().map(of_surface).collect()
+    (lit.into_iter().enumerate().zip(of_sides).map(of_surface).collect(), rooms)
 }
 
 /// For each surface whether it does nothing with light but hide it: it is black, or coincides with another one.
@@ -646,14 +672,22 @@ enum Tree {
 }
 
 impl Tree {
-    fn build(elements: Vec<Element>) -> Option<Self> {
-        if elements.len() <= 1 {
-            return elements.into_iter().next().map(Tree::Leaf);
+    /// One of fronts and one of backs: what a cluster faces is then known better.
+    fn of_sides(sides: Vec<Element>) -> Vec<Self> {
+        let (fronts, backs): (Vec<Element>, Vec<Element>) = sides.into_iter().partition(|e| e.kind == Kind::Front);
+        [fronts, backs].into_iter().filter_map(Self::of).collect()
+    }
+
+    fn of(elements: Vec<Element>) -> Option<Self> {
+        Self::over(elements.into_iter().map(Tree::Leaf).collect())
+    }
+
+    /// One tree of several.
+    fn over(trees: Vec<Self>) -> Option<Self> {
+        if trees.len() <= 1 {
+            return trees.into_iter().next();
         }
-        let boxes: Vec<Boxed> = elements
-            .iter()
-            .map(|e| Boxed(obvhs::aabb::Aabb::new(Vec3A::from(e.bounds[0]), Vec3A::from(e.bounds[1]))))
-            .collect();
+        let boxes: Vec<Boxed> = trees.iter().map(|tree| Boxed(tree.bounds())).collect();
         let params = BvhBuildParams {
             pre_split: false,
             ploc_search_distance: PlocSearchDistance::High,
@@ -665,15 +699,24 @@ impl Tree {
             collapse_traversal_cost: 1.0,
         };
         let bvh = obvhs::bvh2::builder::build_bvh2(&boxes, params, &mut std::time::Duration::default());
-        let mut slots: Vec<Option<Element>> = elements.into_iter().map(Some).collect();
+        let mut slots: Vec<Option<Self>> = trees.into_iter().map(Some).collect();
         Some(Self::convert(&bvh, 0, &mut slots))
     }
 
-    fn convert(bvh: &obvhs::bvh2::Bvh2, node: usize, slots: &mut [Option<Element>]) -> Self {
+    fn bounds(&self) -> obvhs::aabb::Aabb {
+        match self {
+            Self::Leaf(element) => obvhs::aabb::Aabb::new(element.bounds[0].into(), element.bounds[1].into()),
+            Self::Inner(trees) => {
+                trees.iter().map(Self::bounds).reduce(|a, b| a.union(&b)).unwrap_or(obvhs::aabb::Aabb::INVALID)
+            }
+        }
+    }
+
+    fn convert(bvh: &obvhs::bvh2::Bvh2, node: usize, slots: &mut [Option<Self>]) -> Self {
         let primitives =
             |n: &obvhs::bvh2::node::Bvh2Node| n.first_index as usize..(n.first_index + n.prim_count) as usize;
-        let leaf = |node: &obvhs::bvh2::node::Bvh2Node, slots: &mut [Option<Element>]| -> Vec<Tree> {
-            primitives(node).filter_map(|i| slots[bvh.primitive_indices[i] as usize].take()).map(Tree::Leaf).collect()
+        let leaf = |node: &obvhs::bvh2::node::Bvh2Node, slots: &mut [Option<Self>]| -> Vec<Self> {
+            primitives(node).filter_map(|i| slots[bvh.primitive_indices[i] as usize].take()).collect()
         };
         let start = &bvh.nodes[node];
         if start.is_leaf() {

@@ -12,6 +12,7 @@ use crate::links::{Link, Links};
 use crate::refine::Pair;
 use crate::reflect::Senders;
 use crate::resume::Unfinished;
+use crate::rooms::Rooms;
 use crate::solution::Solution;
 use crate::solver::scene_by;
 use crate::stats::{Skipped, Stats};
@@ -121,7 +122,8 @@ impl Elements {
         out.put(&self.facets)?;
         out.put(self.sealed.as_flattened())?;
         out.put(self.touched.as_flattened())?;
-        out.put(&self.exposed)
+        out.put(&self.exposed)?;
+        out.put(&[self.rooms])
     }
 
     fn restore(scene: &SceneData, from: &mut Reader<'_>) -> Result<Self, FlatError> {
@@ -133,7 +135,9 @@ impl Elements {
             sealed: sides(from.take("sealed sides")?),
             touched: sides(from.take("touched sides")?),
             exposed: from.take_finite("exposed shares")?,
+            rooms: from.take_exactly::<Rooms, 1>("rooms")?[0],
         };
+        fits(elements.rooms.is_sound(), "rooms")?;
         let surfaces = scene.surfaces().len();
         fits(elements.nodes.first().is_some_and(|root| root.parent == 0), "elements")?;
         let all = elements.nodes.iter().enumerate();
@@ -259,16 +263,17 @@ fn restore_links(nodes: usize, from: &mut Reader<'_>) -> Result<Links, FlatError
 
 impl Unfinished {
     fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
-        out.put(&[self.tolerance, self.found, f32::from(u8::from(self.in_vain))])?;
+        let flags = [self.in_vain, self.gained].map(|flag| f32::from(u8::from(flag)));
+        out.put(&[self.tolerance, self.found, flags[0], flags[1]])?;
         out.put(&self.unlit)?;
         out.put(&self.coarse)
     }
 
     fn restore(nodes: usize, from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "pairs that are not done";
-        let [tolerance, found, in_vain] = from.take_exactly(WHAT)?;
-        let in_vain = in_vain != 0.0;
-        let unfinished = Self { tolerance, found, in_vain, unlit: from.take(WHAT)?, coarse: from.take(WHAT)? };
+        let [tolerance, found, in_vain, gained] = from.take_exactly(WHAT)?;
+        let [in_vain, gained] = [in_vain, gained].map(|flag| flag != 0.0);
+        let unfinished = Self { tolerance, found, in_vain, gained, unlit: from.take(WHAT)?, coarse: from.take(WHAT)? };
         let is_sound = |pair: &Pair| (pair.receiver as usize) < nodes && (pair.sender as usize) < nodes;
         let pairs = unfinished.unlit.iter().chain(&unfinished.coarse).all(is_sound);
         fits(pairs && tolerance > 0.0 && found >= 0.0, WHAT)?;

@@ -43,6 +43,7 @@ pub mod relight;
 mod renewal;
 mod residual;
 mod resume;
+mod rooms;
 mod rows;
 pub mod sampling;
 pub mod scene;

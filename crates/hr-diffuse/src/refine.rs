@@ -12,6 +12,7 @@ use crate::hooks::LightField;
 use crate::links::Link;
 use crate::oracle::{FactorBounds, factor_bounds};
 use crate::proofs;
+use crate::rooms::are_apart;
 use crate::sampling::hash;
 use crate::segments;
 use crate::shadows;
@@ -70,13 +71,13 @@ pub(crate) struct Pair {
 /// When is a link good enough?
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tolerance {
-    /// Irradiance × importance × √(receiver's share of all area) that a link may be wrong by.
+    /// Irradiance × importance × √(receiver's share of `area`) that a link may be wrong by.
     pub(crate) error: f32,
     /// The same for light that is there on one side of a shadow's edge and not on the other.
     pub(crate) shadow: f32,
     /// Whether links that are there already are looked at for it, too.
     pub(crate) kept_too: bool,
-    /// Total surface area, the measure of a receiver's.
+    /// That of all surfaces, or of those of [one of several rooms](crate::rooms).
     pub(crate) area: f32,
     /// Radius in unit space below which elements are not split.
     pub(crate) smallest: f32,
@@ -383,6 +384,9 @@ fn decide<L: LightField>(
         return Verdict::Facing;
     }
     let own = pair.receiver == pair.sender;
+    if !own && are_apart(r, s) {
+        return Verdict::Blocked;
+    }
     if light.emitted_most(pair.sender) <= 0.0 {
         return Verdict::Unlit;
     }

@@ -9,14 +9,16 @@
 use crate::Rgb;
 use crate::hierarchy::Kind;
 use crate::hooks::LightField;
+use crate::rooms::{NO_ROOM, ROOMS};
 use crate::sampling::{cosine_direction, hash, point4, unit};
 use crate::segments::{light_segment, pick};
 use crate::threads::{self, prelude::*};
 use crate::transport::Light;
 use crate::visibility::NO_BLOCKER;
 use glam::{Vec2, Vec3};
+use smallvec::SmallVec;
 use std::f32::consts::PI;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 /// Sides of the grid of directions of one estimate.
 const GRID: u32 = 8;
@@ -151,41 +153,80 @@ pub(crate) fn residual<L: LightField>(
     })
 }
 
+/// A few nodes.
+type Nodes = SmallVec<[u32; 8]>;
+
 /// What emits.
 struct Emitters {
     /// Power below each node, sum of channels, of what has an extent.
     power: Vec<f32>,
     /// Nodes of lights without extent.
     lights: Vec<u32>,
+    /// By room, the node of all of it.
+    rooms: Vec<u32>,
+    /// Nodes of all that is in no room, where there are rooms.
+    outside: Nodes,
 }
 
 impl Emitters {
     fn new<L: LightField>(light: Light<'_, L>) -> Self {
         let is_light = |&node: &u32| light.element(node).kind == Kind::Light;
         let lights = (0..light.elements.nodes.len() as u32).filter(is_light).collect();
-        Self { power: light.emitted_power(), lights }
+        let mut rooms = Vec::new();
+        for node in 0..light.elements.nodes.len() as u32 {
+            let room = light.element(node).room as usize;
+            // Parents come before what is below them.
+            if room < ROOMS as usize && rooms.get(room).is_none_or(|&node| node == u32::MAX) {
+                rooms.resize(rooms.len().max(room + 1), u32::MAX);
+                rooms[room] = node;
+            }
+        }
+        let outside = children(light, 0).filter(|&node| light.element(node).room == NO_ROOM).collect();
+        Self { power: light.emitted_power(), lights, rooms, outside }
     }
 
-    /// A leaf with extent, drawn by its power over its squared distance from `x`, and the probability of that.
-    fn pick<L: LightField>(&self, light: Light<'_, L>, x: Vec3, mut choice: f32) -> Option<(u32, f32)> {
-        let (mut node, mut probability) = (0, 1.0);
+    /// Nodes below which is all that a leaf may see.
+    fn seen_from<L: LightField>(&self, light: Light<'_, L>, leaf: u32) -> Nodes {
+        match self.rooms.get(light.element(leaf).room as usize) {
+            Some(&room) => self.outside.iter().copied().chain([room]).collect(),
+            None => SmallVec::from_slice(&[0]),
+        }
+    }
+
+    /// A leaf with extent below some nodes, drawn by its power over its squared distance from `x`, and the probability of that.
+    fn pick<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        mut nodes: Nodes,
+        x: Vec3,
+        mut choice: f32,
+    ) -> Option<(u32, f32)> {
+        let mut probability = 1.0;
         loop {
-            let element = light.element(node);
-            if element.child_count == 0 {
-                return Some((node, probability));
-            }
             let weight = |child: u32| {
                 let part = light.element(child);
                 let apart = x.distance_squared(part.center) + part.radius * part.radius;
                 self.power[child as usize] / apart.max(1e-20)
             };
-            let children = element.first_child..element.first_child + element.child_count;
-            let total: f32 = children.clone().map(weight).sum();
-            let (picked, rest) = pick(children.clone().map(weight), choice, total)?;
-            (node, choice) = (children.start + picked as u32, rest);
-            probability *= weight(node) / total;
+            let mut node = nodes[0];
+            if nodes.len() > 1 {
+                let total: f32 = nodes.iter().map(|&node| weight(node)).sum();
+                let (picked, rest) = pick(nodes.iter().map(|&node| weight(node)), choice, total)?;
+                (node, choice) = (nodes[picked], rest);
+                probability *= weight(node) / total;
+            }
+            if light.element(node).child_count == 0 {
+                return Some((node, probability));
+            }
+            nodes = children(light, node).collect();
         }
     }
+}
+
+/// The children of a node.
+fn children<L: LightField>(light: Light<'_, L>, node: u32) -> Range<u32> {
+    let element = light.element(node);
+    element.first_child..element.first_child + element.child_count
 }
 
 /// A random point of a leaf, with its normal.
@@ -241,11 +282,14 @@ fn from_emitters<L: LightField>(
         return (0.0, 0);
     }
     let surface = light.element(leaf).source;
+    let seen = emitters.seen_from(light, leaf);
     let (mut sum, mut rays, mut blocker) = (0.0, 0, NO_BLOCKER);
     for ray in 0..count {
         let u = point4(seed, ray);
         let (x, n) = point(light, leaf, Vec2::new(u.z, u.w));
-        let Some((emitter, probability)) = emitters.pick(light, x, unit(hash(seed, ray))) else { continue };
+        let Some((emitter, probability)) = emitters.pick(light, seen.clone(), x, unit(hash(seed, ray))) else {
+            continue;
+        };
         let (at, normal) = point(light, emitter, Vec2::new(u.x, u.y));
         let to = at - x;
         let d2 = to.length_squared();

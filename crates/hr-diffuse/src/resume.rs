@@ -21,11 +21,14 @@ const STEP: f32 = 0.6;
 /// The next pass aims at the error asked for, as if the error shrank with the square root of the tolerance, which is halved at least
 /// once and so many times at most, …
 const MOST_HALVES: f32 = 3.0;
-/// … down to this tolerance over the error asked for: where more error is left it does not come from links that are too coarse.
+/// … down to this tolerance over the error asked for: where more error is left it seldom comes from links that are too coarse.
+/// Below it passes begin where more than `FAR` times the error asked for is left, and go on, as long as each has gained.
 const FINEST: f32 = 0.25;
+const FAR: f32 = 2.0;
 /// Where an error of more than this share is left at half of the tolerance, or less, it does not come from there either; …
 const NO_BETTER: f32 = 0.85;
-/// … if what was found is known as well as this (relative standard error).
+/// … if what was found is known as well as this (relative standard error). A pass that leaves no more than that share for each
+/// half has gained.
 const KNOWN: f32 = 0.1;
 
 /// What is left to be done of a solution.
@@ -38,6 +41,8 @@ pub(crate) struct Unfinished {
     pub(crate) found: f32,
     /// Whether the last pass found hardly less than the one before, of twice the tolerance.
     pub(crate) in_vain: bool,
+    /// Whether it found much less, for sure.
+    pub(crate) gained: bool,
     /// Pairs without a link, whose sender was dark.
     pub(crate) unlit: Vec<Pair>,
     /// Pairs whose link is that of a larger one.
@@ -47,7 +52,14 @@ pub(crate) struct Unfinished {
 impl Unfinished {
     /// Nothing is done.
     pub(crate) const fn new(unlit: Vec<Pair>) -> Self {
-        Self { tolerance: f32::INFINITY, found: f32::INFINITY, in_vain: false, unlit, coarse: Vec::new() }
+        Self {
+            tolerance: f32::INFINITY,
+            found: f32::INFINITY,
+            in_vain: false,
+            gained: false,
+            unlit,
+            coarse: Vec::new(),
+        }
     }
 
     /// The tolerance of the next pass toward a relative error; `None` where nothing is left to be done.
@@ -59,10 +71,12 @@ impl Unfinished {
             return Some(next.copied().unwrap_or(self.tolerance));
         }
         let in_vain = self.in_vain && self.tolerance < error;
-        let done = self.found <= error || 0.5 * self.tolerance < FINEST * error || in_vain;
+        let is_below = self.tolerance < FINEST * error;
+        let finest = if self.gained && (self.found > FAR * error || is_below) { 0.0 } else { FINEST * error };
+        let done = self.found <= error || 0.5 * self.tolerance < finest || in_vain;
         // Whole halves, so that what rays happen to find seldom makes another solution.
         let halves = (2.0 * (self.found / error).log2()).round().clamp(1.0, MOST_HALVES);
-        (!done).then(|| (self.tolerance * (-halves).exp2()).max(FINEST * error))
+        (!done).then(|| (self.tolerance * (-halves).exp2()).max(finest))
     }
 
     /// Takes note of a pass, and of the error that was found after it, if anybody looked.
@@ -70,6 +84,10 @@ impl Unfinished {
         let finer = tolerance <= 0.5 * self.tolerance;
         let at_most = |found: &Residual| found.error() * (1.0 + found.uncertain);
         let no_better = |found: &Residual| at_most(found) > NO_BETTER * self.found && found.uncertain < KNOWN;
+        let halves = (self.tolerance / tolerance).log2();
+        let much_better =
+            |found: &Residual| at_most(found) <= NO_BETTER.powf(halves) * self.found && found.uncertain < KNOWN;
+        self.gained = finer && self.found.is_finite() && found.is_some_and(much_better);
         self.in_vain = finer && found.is_some_and(no_better);
         (self.tolerance, self.found) = (tolerance, found.map_or(f32::INFINITY, at_most));
     }
@@ -154,6 +172,12 @@ mod tests {
         let mut unknown = Unfinished::new(Vec::new());
         let tried = passes(0.05, &mut unknown, 0.3, |_| 0.06);
         assert!(tried.len() > once.len(), "what nobody knows does not end it: {tried:?}");
+        let mut far = Unfinished::new(Vec::new());
+        let all = passes(0.05, &mut far, 0.0, |tolerance| 3.0 * tolerance.sqrt());
+        assert!(far.found <= 0.05 && far.tolerance < FINEST * 0.05, "far off, as long as it helps: {all:?}");
+        let mut stops = Unfinished::new(Vec::new());
+        let some = passes(0.05, &mut stops, 0.0, |tolerance| (3.0 * tolerance.sqrt()).max(0.2));
+        assert!(some.len() < all.len() && stops.found > 0.1, "and no longer: {some:?}");
         assert!(stays.next(0.02).is_some(), "who asks for much less may have it tried");
     }
 }

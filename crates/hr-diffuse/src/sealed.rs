@@ -10,6 +10,7 @@
 
 use crate::geometry::{Aabb, Domain, Geometry};
 use crate::hierarchy::SceneData;
+use crate::rooms::{Rooms, rooms};
 use crate::sampling::{cosine_direction, hash, point2, point4};
 use crate::segments::light_segment;
 use crate::threads::prelude::*;
@@ -21,7 +22,7 @@ use std::ops::Range;
 
 /// Rays that a group shares in successive rounds; only groups that are still dark take part in the next one, and
 /// emitters.
-const ROUNDS: [u32; 6] = [1, 2, 8, 32, 128, 384];
+pub(crate) const ROUNDS: [u32; 6] = [1, 2, 8, 32, 128, 384];
 /// In rounds with so many rays every spot has one at least.
 const ALL_SPOTS: u32 = 128;
 
@@ -56,12 +57,13 @@ pub(crate) fn is_back(side: Side) -> bool {
     !side.is_multiple_of(2)
 }
 
-/// For each surface, whether its front and its back may be lit. Where nothing is, everything counts as if it were: there
-/// is no light in the scene. `idle` surfaces hide light, and do nothing else with it.
+/// For each surface, whether its front and its back may be lit; and what [rooms](crate::rooms) there are, and which its front and
+/// its back are in. Where nothing is lit, everything counts as if it were: there is no light in the scene. `idle` surfaces hide
+/// light, and do nothing else with it.
 ///
 /// A side that sees lit ones in less than about a hundredth of its view, or of that of the group that it belongs to, may
 /// be missed.
-pub(crate) fn lit_sides(scene: &SceneData, idle: &[bool]) -> Vec<[bool; 2]> {
+pub(crate) fn lit_sides(scene: &SceneData, idle: &[bool]) -> (Vec<[bool; 2]>, Rooms, Vec<[u32; 2]>) {
     let mut spots = Spots::new(scene, idle);
     // What emitters see is lit; few rays from elsewhere would find a small one.
     let emitters: Vec<u32> = (0..spots.all.len() as u32).filter(|&spot| spots.groups.is_lit(spot)).collect();
@@ -81,7 +83,11 @@ pub(crate) fn lit_sides(scene: &SceneData, idle: &[bool]) -> Vec<[bool; 2]> {
         let side = spots.all[spot as usize].side;
         lit[(side / 2) as usize][(side % 2) as usize] |= spots.groups.is_lit(spot);
     }
-    if lit.iter().flatten().any(|lit| *lit) { lit } else { vec![[true; 2]; lit.len()] }
+    if !lit.iter().flatten().any(|lit| *lit) {
+        lit.fill([true; 2]);
+    }
+    let (rooms, of_sides) = rooms(&mut spots, first);
+    (lit, rooms, of_sides)
 }
 
 /// Whether a side does anything with light that falls on it.
@@ -112,8 +118,8 @@ pub(crate) fn outward(geometry: &Geometry, side: Side) -> Vec3 {
 }
 
 /// A place on a large side, which stands for what is around it; or a whole side.
-struct Spot {
-    side: Side,
+pub(crate) struct Spot {
+    pub(crate) side: Side,
     /// On large sides.
     at: Vec3,
     /// The next one on the same side.
@@ -140,14 +146,14 @@ struct Seen {
 }
 
 /// All spots, and to what groups rays have joined them.
-struct Spots<'a> {
-    scene: &'a SceneData,
-    all: Vec<Spot>,
+pub(crate) struct Spots<'a> {
+    pub(crate) scene: &'a SceneData,
+    pub(crate) all: Vec<Spot>,
     /// The spot of each side that was added last; [`NONE`] on sides that do nothing with light or that none can reach.
     of_side: Vec<u32>,
     /// Surfaces whose sides have several spots.
     large: Vec<bool>,
-    groups: Groups,
+    pub(crate) groups: Groups,
 }
 
 impl<'a> Spots<'a> {
@@ -189,8 +195,14 @@ impl<'a> Spots<'a> {
         id
     }
 
+    /// Where a spot of a large side is.
+    pub(crate) fn place(&self, spot: u32) -> Option<Vec3> {
+        let Spot { side, at, .. } = self.all[spot as usize];
+        self.large[(side / 2) as usize].then_some(at)
+    }
+
     /// Joins spots to what rays from them meet; those of a group share `rays`, of which `first` were shot before.
-    fn explore(&mut self, looking: &[u32], first: u32, rays: u32) {
+    pub(crate) fn explore(&mut self, looking: &[u32], first: u32, rays: u32) {
         let mut sharing = vec![0_u32; self.all.len()];
         for &spot in looking {
             sharing[self.groups.known_root(spot)] += 1;
@@ -341,7 +353,7 @@ impl<'a> Spots<'a> {
     }
 
     /// The spots of a side.
-    fn on_side(&self, side: Side) -> impl Iterator<Item = u32> {
+    pub(crate) fn on_side(&self, side: Side) -> impl Iterator<Item = u32> {
         let known = |spot: u32| (spot != NONE).then_some(spot);
         std::iter::successors(known(self.of_side[side as usize]), move |&spot| known(self.all[spot as usize].next))
     }
@@ -390,18 +402,18 @@ impl Groups {
     }
 
     /// Makes all members point to their roots, for [`known_root`](Self::known_root).
-    fn flatten(&mut self) {
+    pub(crate) fn flatten(&mut self) {
         for member in 0..self.parent.len() as u32 {
             self.parent[member as usize] = self.root(member) as u32;
         }
     }
 
     /// The root as it was when all were flattened.
-    fn known_root(&self, member: u32) -> usize {
+    pub(crate) fn known_root(&self, member: u32) -> usize {
         self.parent[member as usize] as usize
     }
 
-    fn is_known_lit(&self, member: u32) -> bool {
+    pub(crate) fn is_known_lit(&self, member: u32) -> bool {
         self.lit[self.known_root(member)]
     }
 

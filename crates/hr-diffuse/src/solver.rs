@@ -35,7 +35,7 @@ const LINK_SHARE: f32 = 0.07;
 /// Irradiance × importance × √(share of all area) that may be there on one side of a shadow's edge in a leaf and not on the other,
 /// as a share of the error asked for times the mean irradiance.
 const SHADOW_SHARE: f32 = 0.025;
-/// Elements are not split below this share of the tolerance's square root: features smaller than that are not resolved.
+/// Elements are not split below this share of the tolerance's square root, times the size of a room: features smaller than that are not resolved.
 const SMALLEST_SHARE: f32 = 0.008;
 /// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
 /// diffuse light until it is shown.
@@ -303,7 +303,7 @@ impl<L: LightField> Solver<L> {
         }
         if let Some(before) = goes_on {
             (self.unfinished.tolerance, self.unfinished.found) = before;
-            self.unfinished.in_vain = false;
+            (self.unfinished.in_vain, self.unfinished.gained) = (false, false);
         }
         if self.stats.iterations == 0 {
             // Whenever it was stopped, there is some light.
@@ -503,8 +503,8 @@ impl<L: LightField> Solver<L> {
                 f32::INFINITY
             },
             kept_too: !self.edges_known,
-            area: self.area,
-            smallest: SMALLEST_SHARE * pass.tolerance.sqrt(),
+            area: self.elements.measure(),
+            smallest: SMALLEST_SHARE * pass.tolerance.sqrt() * self.elements.rooms.size,
             skips: self.skips,
         };
         let error = self.believed_error();
@@ -723,7 +723,7 @@ impl<L: LightField> Solver<L> {
 
     /// What an error of the irradiance of a receiver counts.
     pub(crate) fn weight(&self, receiver: u32) -> f32 {
-        self.elements.nodes[receiver as usize].weight(self.area)
+        self.elements.nodes[receiver as usize].weight(self.elements.measure())
     }
 
     /// Mean irradiance of the surfaces that any light reaches and that reflect any; before there is any, that which the emitted power
