@@ -181,7 +181,7 @@ impl<B: Basis> GlossyField<B> {
         // A lobe that is not round is narrower one way; a mirror shows everything.
         let is_wide = material.mirror.is_none() && material.reflector.grain().is_none();
         merge_close(&mut incident, if is_wide { width.max(narrowest) } else { narrowest });
-        merge_weak(&mut incident);
+        merge_weak(&mut incident, width.max(narrowest));
         // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
         for sample in &mut incident {
             sample.widen(if width < WIDE * narrowest { narrowest } else { 0.0 });
