@@ -209,6 +209,7 @@ fn together(samples: &[Incident]) -> Incident {
         extent: (extent2 + spread).sqrt().min(std::f32::consts::FRAC_PI_2),
         irradiance: samples.iter().map(|s| s.irradiance).sum(),
         contour: Contour::NONE,
+        nearness: weighted(|s| Vec3::splat(s.nearness)).x,
     }
 }
 
@@ -252,6 +253,13 @@ fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Plac
         extent,
         irradiance: sample.irradiance() * scale,
         contour: if extent > 0.0 { contour(hierarchy, sender, place) } else { Contour::NONE },
+        nearness: if hierarchy.is_distant(sender) {
+            0.0
+        } else {
+            // Within the ball that holds it nobody knows where its light comes from.
+            let distance = hierarchy.center(sender).distance(place.at).max(hierarchy.radius(sender));
+            distance.max(f32::MIN_POSITIVE).recip()
+        },
     })
 }
 
