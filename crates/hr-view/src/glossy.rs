@@ -29,28 +29,29 @@ pub enum Mode {
     Gather,
 }
 
-/// Radiance (W/(m² sr)) from a leaf's distribution at a place `at` (unit space) of the leaf with the unit normal
-/// given, in the unit direction `away`, without the diffuse part; and the weight that it has among its neighbours'.
+/// Radiance (W/(m² sr)) from a leaf's distribution at a place `at` (unit space) of the leaf that mirrors to the eye what it sees in
+/// the unit direction `seen`, without the diffuse part; and the weight that it has among its neighbours'.
 ///
-/// The leaf's distribution is that of its middle, with the normal there. What the place sends toward `away` the middle sends toward
-/// [another direction](glossy_ext::Focus::away_from_middle), which is where its distribution is asked.
-pub(crate) fn leaving<B: Basis>(
-    solution: &Solution<GlossyField<B>>,
-    leaf: NodeId,
-    (at, normal): (Vec3, Vec3),
-    away: Vec3,
-) -> (Rgb, f32) {
+/// The leaf's distribution is that of its middle, with the normal there. The middle sees the same in
+/// [another direction](glossy_ext::Focus::from_middle), and mirrors it to where its distribution is asked.
+pub(crate) fn leaving<B: Basis>(solution: &Solution<GlossyField<B>>, leaf: NodeId, at: Vec3, seen: Vec3) -> (Rgb, f32) {
     let element = &solution.elements.nodes[leaf.index()];
     let axis = element.normals.axis;
-    let distribution = &solution.reflected[leaf.index()];
-    let away = distribution.focus.away_from_middle(axis, (at - element.center, normal), away);
-    let weight = away.dot(axis).max(LEAST_COSINE);
-    if distribution.is_empty() {
+    let outgoing = &solution.reflected[leaf.index()];
+    let from_middle = outgoing.focus.from_middle(at - element.center, seen);
+    let cosine = from_middle.dot(axis);
+    let weight = (cosine / from_middle.length()).max(LEAST_COSINE);
+    if outgoing.is_empty() {
         return (carried(solution, leaf), weight);
     }
-    let light = distribution.eval(away);
+    let light = outgoing.eval(axis * (2.0 * cosine) - from_middle);
     // Elsewhere it is intensity per area.
     (if element.is_flat() { light } else { light / weight }, weight)
+}
+
+/// The unit direction from which a place with a unit normal mirrors light to where a unit direction leads `away`.
+pub(crate) fn mirrored(normal: Vec3, away: Vec3) -> Vec3 {
+    -away.reflect(normal)
 }
 
 /// Radiance of a leaf without a distribution, whose glossy light is carried as diffuse light.
@@ -86,12 +87,13 @@ pub fn interpolated<B: Basis>(
 pub(crate) fn blended<B: Basis>(
     solution: &Solution<GlossyField<B>>,
     leaves: impl IntoIterator<Item = (u32, f32)>,
-    place: (Vec3, Vec3),
+    (at, normal): (Vec3, Vec3),
     away: Vec3,
 ) -> Rgb {
+    let seen = mirrored(normal, away);
     let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
     for (leaf, share) in leaves {
-        let (light, weight) = leaving(solution, NodeId(leaf), place, away);
+        let (light, weight) = leaving(solution, NodeId(leaf), at, seen);
         sum += light * weight * share;
         weights += weight * share;
     }

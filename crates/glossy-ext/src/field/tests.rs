@@ -95,8 +95,8 @@ fn highlights_move_over_a_leaf_with_the_eye() {
         let places = (0..101_u8).flat_map(|i| (0..101_u8).map(move |k| [i, k].map(|k| 0.01 * f32::from(k) - 0.5)));
         let light = |[x, y]: [f32; 2]| {
             let at = Vec3::new(x, y, 0.0);
-            let away = focus.away_from_middle(Vec3::Z, (at, Vec3::Z), (eye - at).normalize());
-            (exitant.eval(away).x, at)
+            let seen = -(eye - at).normalize().reflect(Vec3::Z);
+            (exitant.eval((-focus.from_middle(at, seen)).reflect(Vec3::Z)).x, at)
         };
         places.map(light).fold((0.0, Vec3::ZERO), |best, next| if next.0 > best.0 { next } else { best }).1
     };
