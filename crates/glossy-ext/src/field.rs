@@ -3,6 +3,7 @@
 use crate::Rgb;
 use crate::basis::{Basis, Beyond, Known, Peak, Support};
 use crate::haar::{Haar, Refinement};
+use crate::outgoing::{Focus, Outgoing};
 use crate::reflector::{Incident, Reflector, Ward};
 use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_close, merge_weak};
 use glam::Vec3;
@@ -181,7 +182,8 @@ impl<B: Basis> GlossyField<B> {
         // A lobe that is not round is narrower one way; a mirror shows everything.
         let is_wide = material.mirror.is_none() && material.reflector.grain().is_none();
         merge_close(&mut incident, if is_wide { width.max(narrowest) } else { narrowest });
-        merge_weak(&mut incident);
+        let focus = Focus::of(&incident, &place.frame);
+        merge_weak(&mut incident, width.max(narrowest));
         // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
         for sample in &mut incident {
             sample.widen(if width < WIDE * narrowest { narrowest } else { 0.0 });
@@ -191,7 +193,7 @@ impl<B: Basis> GlossyField<B> {
         }
         // A glossy part may be negative where the diffuse one overestimates; both together are not.
         let (flat, least) = (hierarchy.is_flat(leaf), -arrived.diffuse);
-        Some(Reflection { material, place, incident, narrowest, flat, least, negligible: arrived.negligible })
+        Some(Reflection { material, place, incident, focus, narrowest, flat, least, negligible: arrived.negligible })
     }
 
     /// Represents what a leaf reflects in the basis.
@@ -283,6 +285,7 @@ pub struct Reflection<'a> {
     material: &'a Material,
     place: Place,
     incident: Vec<Incident>,
+    focus: Focus,
     /// Detail finer than this (radians) is lost.
     narrowest: f32,
     /// Whether it is radiance rather than intensity per area.
@@ -304,6 +307,12 @@ impl Reflection<'_> {
     #[must_use]
     pub fn incident(&self) -> &[Incident] {
         &self.incident
+    }
+
+    /// How what it shows moves over the leaf.
+    #[must_use]
+    pub fn focus(&self) -> Focus {
+        self.focus
     }
 
     /// What the leaf sends in a unit direction away from it, as [`LightField::radiance`] tells of its projection; lobes
@@ -345,7 +354,7 @@ impl Reflection<'_> {
 
 impl<B: Basis> LightField for GlossyField<B> {
     type Incident = SampleSet;
-    type Exitant = B;
+    type Exitant = Outgoing<B>;
 
     fn active(&self, material: u32) -> Option<Rgb> {
         self.material(Some(material)).map(|m| m.albedo)
@@ -355,7 +364,7 @@ impl<B: Basis> LightField for GlossyField<B> {
         size_of_val(&**incident)
     }
 
-    fn exitant_bytes(&self, exitant: &B) -> usize {
+    fn exitant_bytes(&self, exitant: &Outgoing<B>) -> usize {
         exitant.bytes() - size_of::<B>()
     }
 
@@ -368,20 +377,20 @@ impl<B: Basis> LightField for GlossyField<B> {
         incident.push(IlluminationSample::new(transfer));
     }
 
-    fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], arrived: Arrived) -> B {
+    fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], arrived: Arrived) -> Outgoing<B> {
         debug_assert_eq!(arrived.fault(), None, "the host keeps to what the hooks ask for: {arrived:?}");
         debug_assert!(!path.is_empty(), "the path of leaf {} has the leaf itself in it", leaf.0);
-        let Some(reflection) = self.reflection(hierarchy, leaf, path, arrived) else { return B::default() };
-        let mut exitant = self.project(&reflection);
-        reflection.conserve(&mut exitant, arrived.irradiance);
-        exitant
+        let Some(reflection) = self.reflection(hierarchy, leaf, path, arrived) else { return Outgoing::default() };
+        let mut distribution = self.project(&reflection);
+        reflection.conserve(&mut distribution, arrived.irradiance);
+        Outgoing { distribution, focus: reflection.focus }
     }
 
-    fn radiance(&self, exitant: &B, away: Vec3) -> Rgb {
+    fn radiance(&self, exitant: &Outgoing<B>, away: Vec3) -> Rgb {
         exitant.eval(away)
     }
 
-    fn radiance_bounds(&self, exitant: &B, away: &Cone) -> (Rgb, Rgb) {
+    fn radiance_bounds(&self, exitant: &Outgoing<B>, away: &Cone) -> (Rgb, Rgb) {
         exitant.bounds(away)
     }
 }

@@ -10,12 +10,14 @@ pub mod conformance;
 pub mod field;
 pub mod haar;
 mod keep;
+pub mod outgoing;
 pub mod reflector;
 pub mod samples;
 
 pub use basis::Basis;
 pub use field::{GlossyField, Reflection};
 pub use hr_diffuse::{Rgb, hooks};
+pub use outgoing::{Focus, Outgoing};
 pub use reflector::{
     Compensated, Contour, Formula, Incident, Lambert, Lobe, MerlError, MetallicRoughness, Phong, Reflector,
     ReflectorError, Sample, Sum, Tabulated, Ward,

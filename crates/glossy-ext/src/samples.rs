@@ -122,6 +122,11 @@ pub fn arriving<H: Hierarchy>(
 
 /// Weak samples that are merged make up at most this share of the irradiance at a place.
 const WEAK_SHARE: f32 = 0.3;
+/// Weak samples that make a peak of at least this share of the highest one stay as they are: of the lamps along a counter one sees
+/// the far ones, too. That takes 8 % more BRDF evaluations in a soda shop.
+const PEAK_SHARE: f32 = 0.25;
+/// Lobes grow brighter toward the horizon, but no further than this cosine.
+const LEAST_COSINE: f32 = 0.1;
 /// Cells along each side of the square that the hemisphere of directions is mapped to, for weak samples: 25° wide.
 const WEAK_CELLS: f32 = 6.0;
 /// Cells for close samples are at most this part of the lobe's width. What is merged then lies within a ninth of the width
@@ -143,9 +148,9 @@ pub fn merge_close(incident: &mut Vec<Incident>, width: f32) {
     }
 }
 
-/// Merges the weakest samples at a place, so that no more than 36 of them are left. The strong ones, which make the peaks
-/// of what is reflected, stay as they are.
-pub fn merge_weak(incident: &mut Vec<Incident>) {
+/// Merges the weakest samples at a place, so that no more than 36 of them are left. The strong ones stay as they are, and so do
+/// weak ones that make peaks of what a lobe of this width (radians) reflects: small lamps, far away.
+pub fn merge_weak(incident: &mut Vec<Incident>, width: f32) {
     if incident.len() <= (WEAK_CELLS * WEAK_CELLS) as usize {
         return;
     }
@@ -157,6 +162,13 @@ pub fn merge_weak(incident: &mut Vec<Incident>) {
         strong -= 1;
         rest += strength(&incident[strong]);
     }
+    // The lobe that a sample makes, at its brightest: irradiance across the direction, over all that it is spread over.
+    let peak = |sample: &Incident| {
+        strength(sample) / (sample.direction.z.max(LEAST_COSINE) * (sample.extent * sample.extent + width * width))
+    };
+    let least = PEAK_SHARE * incident.iter().map(peak).fold(0.0, f32::max);
+    incident[strong..].sort_by_key(|sample| peak(sample) < least);
+    strong += incident[strong..].iter().take_while(|sample| peak(sample) >= least).count();
     merge(incident, strong, WEAK_CELLS);
 }
 
@@ -197,6 +209,7 @@ fn together(samples: &[Incident]) -> Incident {
         extent: (extent2 + spread).sqrt().min(std::f32::consts::FRAC_PI_2),
         irradiance: samples.iter().map(|s| s.irradiance).sum(),
         contour: Contour::NONE,
+        nearness: weighted(|s| Vec3::splat(s.nearness)).x,
     }
 }
 
@@ -240,6 +253,13 @@ fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Plac
         extent,
         irradiance: sample.irradiance() * scale,
         contour: if extent > 0.0 { contour(hierarchy, sender, place) } else { Contour::NONE },
+        nearness: if hierarchy.is_distant(sender) {
+            0.0
+        } else {
+            // Within the ball that holds it nobody knows where its light comes from.
+            let distance = hierarchy.center(sender).distance(place.at).max(hierarchy.radius(sender));
+            distance.max(f32::MIN_POSITIVE).recip()
+        },
     })
 }
 
@@ -300,6 +320,27 @@ mod tests {
             }
             assert!(counts[3] < 2 * counts[1] && counts[3] < 700, "64 times the samples: {counts:?}");
         }
+    }
+
+    /// A lamp far down a room brings little, and is seen all the same beside one overhead.
+    #[test]
+    fn weak_lamps_stay_where_walls_are_merged() {
+        let sample = |direction: Vec3, extent, irradiance: f32| Incident {
+            direction: direction.normalize(),
+            extent,
+            irradiance: Rgb::splat(irradiance),
+            ..Incident::default()
+        };
+        let overhead = sample(Vec3::new(0.2, 0.0, 1.0), 0.18, 18.0);
+        let far = sample(Vec3::new(0.95, 0.0, 0.29), 0.055, 0.6);
+        let wall = |k: u8| sample(Vec2::from_angle(0.3 * f32::from(k)).extend(0.1 + 0.01 * f32::from(k)), 0.3, 0.1);
+        let mut incident: Vec<Incident> = [overhead, far].into_iter().chain((0..60).map(wall)).collect();
+        let irradiance = |of: &[Incident]| of.iter().map(strength).sum::<f32>();
+        let before = irradiance(&incident);
+        merge_weak(&mut incident, 0.1);
+        assert!(incident.contains(&overhead) && incident.contains(&far), "both lamps stay: {incident:?}");
+        assert!(incident.len() <= 2 + 36, "walls are merged: {} samples", incident.len());
+        assert!((irradiance(&incident) / before - 1.0).abs() < 1e-5, "irradiance adds up");
     }
 
     #[test]

@@ -49,6 +49,14 @@ pub struct Source {
     pub corners: [(u32, f32); 3],
 }
 
+impl Source {
+    /// Where the vertex is, in unit space.
+    pub(crate) fn place(&self, solution: &Solution<GlossyField>) -> Vec3 {
+        let surface = solution.elements.nodes[self.leaf as usize].source;
+        solution.scene.surfaces()[surface as usize].point(self.uv)
+    }
+}
+
 /// The triangles that show a solution, and what they show.
 #[derive(Debug)]
 pub struct Facets {

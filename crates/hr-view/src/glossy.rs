@@ -29,29 +29,29 @@ pub enum Mode {
     Gather,
 }
 
-/// Radiance (W/(m² sr)) from a leaf's distribution at a place of the leaf with the unit normal given, in the unit
-/// direction `away`, without the diffuse part; and the weight that it has among its neighbours'.
+/// Radiance (W/(m² sr)) from a leaf's distribution at a place `at` (unit space) of the leaf that mirrors to the eye what it sees in
+/// the unit direction `seen`, without the diffuse part; and the weight that it has among its neighbours'.
 ///
-/// The leaf's distribution is that of its own normal. What the place reflects toward `away` comes from the mirrored
-/// direction; the leaf reflects the same toward another one, which is where its distribution is asked.
-pub(crate) fn leaving<B: Basis>(
-    solution: &Solution<GlossyField<B>>,
-    leaf: NodeId,
-    normal: Vec3,
-    away: Vec3,
-) -> (Rgb, f32) {
+/// The leaf's distribution is that of its middle, with the normal there. The middle sees the same in
+/// [another direction](glossy_ext::Focus::from_middle), and mirrors it to where its distribution is asked.
+pub(crate) fn leaving<B: Basis>(solution: &Solution<GlossyField<B>>, leaf: NodeId, at: Vec3, seen: Vec3) -> (Rgb, f32) {
     let element = &solution.elements.nodes[leaf.index()];
     let axis = element.normals.axis;
-    let mirrored = away.reflect(normal);
-    let away = mirrored.reflect(axis);
-    let weight = away.dot(axis).max(LEAST_COSINE);
-    let distribution = &solution.reflected[leaf.index()];
-    if distribution.is_empty() {
+    let outgoing = &solution.reflected[leaf.index()];
+    let from_middle = outgoing.focus.from_middle(at - element.center, seen);
+    let cosine = from_middle.dot(axis);
+    let weight = (cosine / from_middle.length()).max(LEAST_COSINE);
+    if outgoing.is_empty() {
         return (carried(solution, leaf), weight);
     }
-    let light = distribution.eval(away);
+    let light = outgoing.eval(axis * (2.0 * cosine) - from_middle);
     // Elsewhere it is intensity per area.
     (if element.is_flat() { light } else { light / weight }, weight)
+}
+
+/// The unit direction from which a place with a unit normal mirrors light to where a unit direction leads `away`.
+pub(crate) fn mirrored(normal: Vec3, away: Vec3) -> Vec3 {
+    -away.reflect(normal)
 }
 
 /// Radiance of a leaf without a distribution, whose glossy light is carried as diffuse light.
@@ -72,27 +72,28 @@ pub(crate) fn shares<B: Basis>(
 }
 
 /// Radiance from the distributions around some vertices of a leaf, interpolated with the weights given (paper, section
-/// 5.2), at a place with the unit normal given, in the unit direction `away`.
+/// 5.2), at a place (in unit space, with its unit normal), in the unit direction `away`.
 #[must_use]
 pub fn interpolated<B: Basis>(
     solution: &Solution<GlossyField<B>>,
     corners: &[(u32, f32)],
-    normal: Vec3,
+    place: (Vec3, Vec3),
     away: Vec3,
 ) -> Rgb {
-    blended(solution, shares(solution, corners), normal, away)
+    blended(solution, shares(solution, corners), place, away)
 }
 
 /// The same from leaves and their shares, as [`shares`] gives them.
 pub(crate) fn blended<B: Basis>(
     solution: &Solution<GlossyField<B>>,
     leaves: impl IntoIterator<Item = (u32, f32)>,
-    normal: Vec3,
+    (at, normal): (Vec3, Vec3),
     away: Vec3,
 ) -> Rgb {
+    let seen = mirrored(normal, away);
     let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
     for (leaf, share) in leaves {
-        let (light, weight) = leaving(solution, NodeId(leaf), normal, away);
+        let (light, weight) = leaving(solution, NodeId(leaf), at, seen);
         sum += light * weight * share;
         weights += weight * share;
     }

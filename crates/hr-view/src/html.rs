@@ -120,7 +120,7 @@ fn solution(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut i
     let mut payload = Payload::default();
     let names = ["diffuse", "glossy"];
     let lists_facts = [0, 1].map(|i| vertices::add(&mut payload, names[i], mesh, &lists[i], &lattice, tone.exposure));
-    leaves::add(&mut payload, solved, mesh, sources, &lists[1], tone.exposure);
+    leaves::add(&mut payload, solved, mesh, sources, &lists[1], &lattice, tone.exposure);
     let textures = mesh.textures.iter().enumerate().map(|(i, texture)| images::add(&mut payload, i, texture));
     let facts = Facts {
         name: &solved.scene.name,

@@ -111,7 +111,7 @@ impl Anatomy<'_> {
         let diffuse = solution.exitant.radiosity[leaf.index()];
         say.push(format!("radiosity {} W/m² diffuse, with emission", three(diffuse)));
         let away = (eye - hit.point).normalize_or(axis);
-        let (glossy, _) = glossy::leaving(solution, leaf, axis, away);
+        let (glossy, _) = glossy::leaving(solution, leaf, hit.point, glossy::mirrored(axis, away));
         let is_glossy = !material.reflector.is_diffuse();
         if is_glossy {
             let albedo = material.reflector.glossy_albedo() + material.reflector.mirror();
@@ -227,8 +227,11 @@ impl Anatomy<'_> {
             let polar = FRAC_PI_2 * circle as f32 / CIRCLES as f32;
             let turn = TAU * (meridian % MERIDIANS) as f32 / MERIDIANS as f32;
             let away = frame * Vec3::new(polar.sin() * turn.cos(), polar.sin() * turn.sin(), polar.cos());
-            let glossy =
-                if is_glossy { glossy::leaving(solution, leaf, element.normals.axis, away).0 } else { Rgb::ZERO };
+            let glossy = if is_glossy {
+                glossy::leaving(solution, leaf, at, glossy::mirrored(element.normals.axis, away)).0
+            } else {
+                Rgb::ZERO
+            };
             (away, (diffuse + glossy).max(Rgb::ZERO))
         };
         let grid: Vec<Vec<(Vec3, Rgb)>> =

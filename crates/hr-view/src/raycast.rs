@@ -257,7 +257,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// Glossy radiance from the distributions around the point.
     fn interpolated(&self, met: &Met) -> Rgb {
         let corners = self.solution.vertices.interpolation(met.leaf.0, met.hit.uv);
-        glossy::interpolated(self.solution, &corners, met.normal, met.away)
+        glossy::interpolated(self.solution, &corners, (met.hit.point, met.normal), met.away)
     }
 
     /// Glossy radiance from the samples that arrive at the point, or along rays where the lobe is narrow.

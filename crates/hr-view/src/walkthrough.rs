@@ -42,11 +42,7 @@ impl Walkthrough {
     #[must_use]
     pub fn new(solved: Arc<Solved>, mode: Mode) -> Self {
         let Facets { mesh, sources, leaves: triangles } = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
-        let place = |source: &Source| {
-            let surface = solved.solution.elements.nodes[source.leaf as usize].source;
-            solved.solution.scene.surfaces()[surface as usize].point(source.uv)
-        };
-        let places = sources.iter().map(place).collect();
+        let places = sources.iter().map(|source| source.place(&solved.solution)).collect();
         let (mut leaves, mut first) = (Vec::new(), vec![0]);
         let mut around = Vec::new();
         for source in &sources {
@@ -86,7 +82,7 @@ impl Walkthrough {
             }
         }
         let leaves = &self.leaves[self.first[slot] as usize..self.first[slot + 1] as usize];
-        glossy::blended(solution, leaves.iter().copied(), normal, away)
+        glossy::blended(solution, leaves.iter().copied(), (at, normal), away)
     }
 }
 

@@ -76,3 +76,38 @@ fn negligible_detail_is_left_out() {
     let [some, right] = [&nothing, &fine].map(|exitant| exitant.cosine_integral(Vec3::Z).x);
     assert!((some / right - 1.0).abs() < 0.25, "{some} W/m² of {right}");
 }
+
+/// One leaf under one lamp: where the highlight is seen is where a mirror would show the lamp.
+#[test]
+fn highlights_move_over_a_leaf_with_the_eye() {
+    let plastic: Arc<dyn Reflector> = Arc::new(Ward::new(Rgb::ZERO, Rgb::ONE, 0.06).expect("a Ward reflector"));
+    let field = GlossyField::new(&[plastic], Refinement::default());
+    let lamp = Vec3::new(0.2, -0.1, 1.0);
+    let floor = Floor { points: vec![lamp / 10.0] };
+    let (direction, irradiance) = (lamp.normalize(), Rgb::ONE);
+    let mut incident = SampleSet::new();
+    field.receive(&mut incident, &Transfer { sender: NodeId(1), direction, irradiance, oriented: true });
+    let arrived = Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible: 0.0 };
+    let exitant = field.reflect(&floor, FLOOR, &[&incident], arrived);
+    let far = Focus::default();
+    // Where in a square of 1 the leaf shines most toward an eye.
+    let brightest = |focus: Focus, eye: Vec3| {
+        let places = (0..101_u8).flat_map(|i| (0..101_u8).map(move |k| [i, k].map(|k| 0.01 * f32::from(k) - 0.5)));
+        let light = |[x, y]: [f32; 2]| {
+            let at = Vec3::new(x, y, 0.0);
+            let seen = -(eye - at).normalize().reflect(Vec3::Z);
+            (exitant.eval((-focus.from_middle(at, seen)).reflect(Vec3::Z)).x, at)
+        };
+        places.map(light).fold((0.0, Vec3::ZERO), |best, next| if next.0 > best.0 { next } else { best }).1
+    };
+    let (mut worst, mut least) = (0.0_f32, f32::INFINITY);
+    for eye in [[0.6, 0.3, 1.2], [-0.7, 0.2, 0.8], [0.4, -0.8, 1.6], [-0.9, -0.6, 1.0], [0.9, 0.9, 2.0]].map(Vec3::from)
+    {
+        let mirrored = (lamp * eye.z + eye * lamp.z).with_z(0.0) / (eye.z + lamp.z);
+        worst = worst.max(brightest(exitant.focus, eye).distance(mirrored));
+        least = least.min(brightest(far, eye).distance(mirrored));
+    }
+    // The finest triangles are 1.5° wide, which is 0.015 on the leaf; 0.01 is the step between places.
+    assert!(worst < 0.03, "the highlight is off by {worst} of the leaf's width");
+    assert!(least > 0.1, "without its focus the leaf would show it off by {least} at least");
+}

@@ -26,16 +26,16 @@ impl Haar {
     ///
     /// # Errors
     /// Those of what is written to.
-    pub fn store(all: &[Self], out: &mut Writer<'_>) -> io::Result<()> {
+    pub fn store<'a>(all: impl Iterator<Item = &'a Self> + Clone, out: &mut Writer<'_>) -> io::Result<()> {
         let head = |haar: &Self| Head {
             scale: haar.scale,
             roots: haar.roots.into(),
             vertices: haar.vertices.len() as u32,
             nodes: haar.nodes.len() as u32,
         };
-        out.put(&all.iter().map(head).collect::<Vec<_>>())?;
-        out.put(&all.iter().flat_map(|haar| &*haar.vertices).copied().collect::<Vec<Half3>>())?;
-        out.put(&all.iter().flat_map(|haar| &*haar.nodes).copied().collect::<Vec<Node>>())
+        out.put(&all.clone().map(head).collect::<Vec<_>>())?;
+        out.put(&all.clone().flat_map(|haar| &*haar.vertices).copied().collect::<Vec<Half3>>())?;
+        out.put(&all.flat_map(|haar| &*haar.nodes).copied().collect::<Vec<Node>>())
     }
 
     /// Reads what [`store`](Self::store) wrote.

@@ -97,6 +97,8 @@ pub struct Incident {
     pub contour: Contour,
     /// Irradiance on the surface (W/m²), the cosine included.
     pub irradiance: Rgb,
+    /// Reciprocal of the sender's distance in the hierarchy's unit; 0 where it is infinitely far, or where nobody asks.
+    pub nearness: f32,
 }
 
 impl Incident {

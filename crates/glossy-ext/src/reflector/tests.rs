@@ -355,7 +355,8 @@ fn lobes_over_contours_against_brute_force() {
                         continue;
                     }
                     let extent = width * (4.0 * sides[0] * sides[1] / PI).sqrt();
-                    let sample = Incident { direction: middle, extent, irradiance: Rgb::ONE, contour };
+                    let sample =
+                        Incident { direction: middle, extent, irradiance: Rgb::ONE, contour, ..Incident::default() };
                     let exact = contour_average(r, middle, half, taper, outgoing);
                     let of = |sample| (r.reflect_sum(&[sample], outgoing).x - exact).abs() * middle.z;
                     off += of(sample);

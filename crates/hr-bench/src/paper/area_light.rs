@@ -84,6 +84,7 @@ impl Subject {
                 extent: if kind == Kind::Dirac { 0.0 } else { (solid_angle / std::f64::consts::PI).sqrt() as f32 },
                 irradiance: self.radiance * (solid_angle * direction.z.max(0.0)) as f32,
                 contour: if is_square { Contour::new(seen(a), seen(b), 0.0) } else { Contour::NONE },
+                nearness: distance.recip() as f32,
             });
         }
     }

@@ -53,8 +53,8 @@ impl Subject<'_> {
         let field = GlossyField::<B>::in_basis(self.reflectors, settings);
         let (sent, seconds) = reflect(&field, self.solution, &self.leaves, self.attempts);
         Made {
-            functions: sent.iter().map(Basis::basis_functions).sum(),
-            bytes: sent.iter().map(Basis::bytes).sum(),
+            functions: sent.iter().map(|outgoing| outgoing.basis_functions()).sum(),
+            bytes: sent.iter().map(|outgoing| outgoing.bytes()).sum(),
             evaluations: field.counters().brdf_evaluations() / u64::from(self.attempts),
             seconds,
             error: distance(self.solution, &self.leaves, |leaf, away| sent[leaf].eval(away)),

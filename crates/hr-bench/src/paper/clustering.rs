@@ -14,7 +14,7 @@
 use glam::Vec3;
 use glossy_ext::haar::{Haar, Refinement};
 use glossy_ext::samples::SampleSet;
-use glossy_ext::{GlossyField, Reflector, arriving};
+use glossy_ext::{GlossyField, Outgoing, Reflector, arriving};
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Rgb, Transfer};
 use std::sync::Arc;
 
@@ -52,7 +52,7 @@ fn summed(mut all: Vec<Haar>) -> Haar {
 
 impl LightField for RadianceClustering {
     type Incident = SampleSet;
-    type Exitant = Haar;
+    type Exitant = Outgoing<Haar>;
 
     fn active(&self, material: u32) -> Option<Rgb> {
         self.field.active(material)
@@ -66,8 +66,14 @@ impl LightField for RadianceClustering {
         self.field.receive(incident, transfer);
     }
 
-    fn reflect<H: Hierarchy>(&self, hierarchy: &H, leaf: NodeId, path: &[&SampleSet], arrived: Arrived) -> Haar {
-        let Some(whole) = self.field.reflection(hierarchy, leaf, path, arrived) else { return Haar::default() };
+    fn reflect<H: Hierarchy>(
+        &self,
+        hierarchy: &H,
+        leaf: NodeId,
+        path: &[&SampleSet],
+        arrived: Arrived,
+    ) -> Outgoing<Haar> {
+        let Some(whole) = self.field.reflection(hierarchy, leaf, path, arrived) else { return Outgoing::default() };
         let mut here = Vec::new();
         let mut irradiance = |path: &[&SampleSet]| {
             arriving(hierarchy, leaf, path, whole.place(), &mut here);
@@ -86,16 +92,16 @@ impl LightField for RadianceClustering {
                 contributions.extend(contribution.map(|contribution| self.field.project(&contribution)));
             }
         }
-        let mut exitant = summed(contributions);
-        whole.conserve(&mut exitant, arrived.irradiance);
-        exitant
+        let mut distribution = summed(contributions);
+        whole.conserve(&mut distribution, arrived.irradiance);
+        Outgoing { distribution, focus: whole.focus() }
     }
 
-    fn radiance(&self, exitant: &Haar, away: Vec3) -> Rgb {
+    fn radiance(&self, exitant: &Outgoing<Haar>, away: Vec3) -> Rgb {
         self.field.radiance(exitant, away)
     }
 
-    fn radiance_bounds(&self, exitant: &Haar, away: &Cone) -> (Rgb, Rgb) {
+    fn radiance_bounds(&self, exitant: &Outgoing<Haar>, away: &Cone) -> (Rgb, Rgb) {
         self.field.radiance_bounds(exitant, away)
     }
 
@@ -103,7 +109,7 @@ impl LightField for RadianceClustering {
         self.field.incident_bytes(incident)
     }
 
-    fn exitant_bytes(&self, exitant: &Haar) -> usize {
+    fn exitant_bytes(&self, exitant: &Outgoing<Haar>) -> usize {
         Self::DISTRIBUTIONS * self.field.exitant_bytes(exitant)
     }
 }

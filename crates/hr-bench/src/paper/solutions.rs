@@ -7,7 +7,7 @@ use crate::measure::{cpu_seconds, thread_seconds};
 use glam::Vec3;
 use glossy_ext::haar::{Haar, Refinement};
 use glossy_ext::samples::SampleSet;
-use glossy_ext::{GlossyField, Reflector};
+use glossy_ext::{GlossyField, Outgoing, Reflector};
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Rgb, Settings, Solver, Transfer};
 use hr_scene::Scene;
 use std::ops::ControlFlow;
@@ -74,7 +74,7 @@ struct Both {
 /// What a leaf sends by samples, and how many functions it is by clustering.
 #[derive(Default)]
 struct Sent {
-    light: Haar,
+    light: Outgoing<Haar>,
     clustered: usize,
 }
 
@@ -86,7 +86,7 @@ impl Both {
     }
 
     /// What `reflect` makes, its time being noted.
-    fn timed(&self, way: usize, reflect: impl FnOnce() -> Haar) -> Haar {
+    fn timed(&self, way: usize, reflect: impl FnOnce() -> Outgoing<Haar>) -> Outgoing<Haar> {
         let start = thread_seconds();
         let made = reflect();
         self.spent[way].fetch_add((1e9 * (thread_seconds() - start)) as u64, Ordering::Relaxed);

@@ -6,7 +6,7 @@ use super::{Page, percent, relative, times};
 use crate::BenchError;
 use glam::{DVec3, dvec3};
 use glossy_ext::haar::{Haar, Refinement};
-use glossy_ext::{GlossyField, Lambert, Reflector, ReflectorError, Ward};
+use glossy_ext::{GlossyField, Lambert, Outgoing, Reflector, ReflectorError, Ward};
 use hr_diffuse::{DiffuseMaterial, Rgb, SceneInput, Shape, Surface};
 use std::sync::Arc;
 
@@ -72,8 +72,8 @@ fn both_ways(angle: f64, alpha: f32, refinement: Refinement) -> Result<(usize, [
     let (input, reflectors) = lights(angle, alpha).map_err(|error| BenchError::Arguments(error.to_string()))?;
     let solution = solve(&input, &reflectors, ERROR)?;
     let leaves = glossy_leaves(&solution, 1);
-    let made = |distributions: &[Haar], evaluations: u64, seconds: f64| Made {
-        functions: distributions.iter().map(Haar::basis_functions).sum(),
+    let made = |distributions: &[Outgoing<Haar>], evaluations: u64, seconds: f64| Made {
+        functions: distributions.iter().map(|outgoing| outgoing.basis_functions()).sum(),
         evaluations: evaluations / u64::from(ATTEMPTS),
         seconds,
         error: distance(&solution, &leaves, |leaf, away| distributions[leaf].eval(away)),

@@ -93,9 +93,10 @@ fn directional(
     let project = |&vertex: &u32| {
         let Some(source) = source_of[vertex as usize] else { return [Rgb::ZERO; COUNT] };
         let normal = mesh.normals[vertex as usize];
+        let place = source.place(&solved.solution);
         harmonics::project(|away| {
             let above = away.dot(normal) > 0.0;
-            if above { interpolated(&solved.solution, &source.corners, normal, away) } else { Rgb::ZERO }
+            if above { interpolated(&solved.solution, &source.corners, (place, normal), away) } else { Rgb::ZERO }
         })
     };
     list.vertices.par_iter().map(project).collect()

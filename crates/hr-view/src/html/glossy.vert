@@ -7,7 +7,8 @@ precision highp sampler2D;
 
 uniform vec3 eye;           // relative to the mesh's origin
 uniform usampler2D shares;  // a leaf in the low 24 bits, its weight above
-uniform usampler2D leaves;  // axis; first node; first value; bits 0 … 7: faces that have a node, bit 8: flat
+uniform usampler2D leaves;  // axis; first node; first value; bits 0 … 7: faces that have a node, bit 8: flat, the upper half:
+                            // z of the focus. Then: middle; x (lower half) and y of the focus
 uniform usampler2D nodes;   // three midpoints of 15 bits, first child's node of 15, four bits: children that have one
 uniform sampler2D values;   // at the vertices of distributions
 
@@ -19,6 +20,8 @@ out vec3 radiance;
 const uint NO_VERTEX = 0x7fffu;
 // Cosine below which a distribution says less and less about what is reflected: it is no longer divided by it.
 const float LEAST_COSINE = 0.05;
+// A place is at least so much of the middle's distance away from the plane of what lights a leaf.
+const float NEAREST = 0.25;
 // Where normals point so far away from the eye (cosine) no triangle of the vertex is seen.
 const float HIDDEN = -0.5;
 
@@ -97,15 +100,20 @@ void main() {
   if (dot(facing, away) < HIDDEN) {
     return;
   }
-  vec3 mirrored = reflect(away, facing);
+  vec3 seen = -reflect(away, facing);
   float weights = 0.0;
   for (uint i = 0u; i < range.y; i++) {
     uint share = texelFetch(shares, at(range.x + i), 0).x;
-    uvec4 leaf = texelFetch(leaves, at(share & 0xffffffu), 0);
+    uint index = 2u * (share & 0xffffffu);
+    uvec4 leaf = texelFetch(leaves, at(index), 0);
+    uvec4 middle = texelFetch(leaves, at(index + 1u), 0);
     vec3 axis = unfolded(unpackSnorm2x16(leaf.x));
-    // What the place reflects toward the eye comes from the mirrored direction; the leaf reflects the same toward
-    // another one, which is where its distribution is asked.
-    vec3 asked = reflect(mirrored, axis);
+    // What the place reflects toward the eye comes from the mirrored direction. The leaf's middle sees the same from another one,
+    // where the ray meets the plane of what lights the leaf, and mirrors it in its own way: there its distribution is asked.
+    vec3 offset = place - uintBitsToFloat(middle.xyz);
+    vec3 plane = uintBitsToFloat(uvec3(middle.w << 16u, middle.w & 0xffff0000u, leaf.w & 0xffff0000u));
+    vec3 turned = seen * max(1.0 - dot(plane, offset), NEAREST) + offset * max(dot(plane, seen), 0.0);
+    vec3 asked = reflect(-normalize(turned), axis);
     float cosine = max(dot(asked, axis), LEAST_COSINE);
     vec3 light = evaluate(leaf, asked);
     float weight = float(share >> 24u);

@@ -2,12 +2,13 @@
 
 use super::directions::{self, Shine};
 use super::payload::Payload;
-use super::vertices::packed_normal;
+use super::vertices::{Lattice, packed_normal};
 use crate::display::DisplayMesh;
 use crate::facets::Source;
 use crate::glossy;
 use crate::solved::Solved;
 use crate::window::lists::VertexList;
+use glossy_ext::Focus;
 use glossy_ext::haar::{Haar, Known, Refinement};
 use hr_diffuse::NodeId;
 use std::collections::HashMap;
@@ -16,7 +17,8 @@ use std::f32::consts::FRAC_1_PI;
 /// At most so many distributions are evaluated for a vertex; the weakest are left out.
 const MOST_SHARES: usize = 12;
 
-/// Adds the leaves around the vertices of the glossy list, their weights, and their distributions, times `exposure`.
+/// Adds the leaves around the vertices of the glossy list, their weights, and their distributions, times `exposure`,
+/// with middles on the lattice and foci.
 /// `sources` belong to the mesh's glossy vertices.
 pub(super) fn add(
     payload: &mut Payload,
@@ -24,6 +26,7 @@ pub(super) fn add(
     mesh: &DisplayMesh,
     sources: &[Source],
     list: &VertexList,
+    lattice: &Lattice,
     exposure: f32,
 ) {
     let source_of: HashMap<u32, &Source> = std::iter::zip(mesh.glossy.iter().copied(), sources).collect();
@@ -51,6 +54,18 @@ pub(super) fn add(
     let element = |leaf: NodeId| &solution.elements.nodes[leaf.index()];
     let axes: Vec<u32> = leaves.iter().map(|&leaf| packed_normal(element(leaf).normals.axis)).collect();
     payload.words("leaf.axes", &axes);
+    // In the mesh's frame.
+    let normalization = &solution.scene.normalization;
+    let middle = |leaf: NodeId| (normalization.to_scene(element(leaf).center) - mesh.origin).as_vec3();
+    for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
+        payload.steps(format!("leaf.{letter}"), leaves.iter().map(|&leaf| lattice.place(middle(leaf))[axis]));
+    }
+    let unit = normalization.scale() as f32;
+    let foci = leaves.iter().map(|&leaf| Focus::new(solution.reflected[leaf.index()].focus.plane() * unit).to_bits());
+    let (sides, heights): (Vec<u32>, Vec<u32>) =
+        foci.map(|[x, y, z]| (u32::from(x) | u32::from(y) << 16, u32::from(z))).unzip();
+    payload.words("leaf.focus.xy", &sides);
+    payload.words("leaf.focus.z", &heights);
     // Light that is carried as diffuse light is the same in all directions, as radiance.
     let even: Vec<Option<Haar>> = leaves
         .iter()
@@ -67,7 +82,7 @@ pub(super) fn add(
         .map(|(&leaf, even)| {
             let diffuse = solved.scene.materials[element(leaf).material as usize].reflector.diffuse();
             let beside = diffuse * solution.exitant.irradiance[leaf.index()] * FRAC_1_PI;
-            Shine { haar: even.as_ref().unwrap_or(&solution.reflected[leaf.index()]), beside }
+            Shine { haar: even.as_ref().unwrap_or(&solution.reflected[leaf.index()].distribution), beside }
         })
         .collect();
     directions::add(payload, &shines, exposure);

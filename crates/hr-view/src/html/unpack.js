@@ -68,11 +68,17 @@ function unfold(step) {
   return step >>> 1 ^ -(step & 1);
 }
 
-// Vertices and triangles of one of the two lists.
-function unpackList(sections, name, { batches }, { low, step }) {
+// Places on the lattice.
+function unpackPlaces(sections, name, { low, step }) {
   const axes = ["x", "y", "z"].map((axis) => sections.steps(`${name}.${axis}`));
   const places = new Float32Array(3 * axes[0].length);
   axes.forEach((axis, k) => axis.forEach((word, i) => { places[3 * i + k] = low[k] + word * step[k]; }));
+  return places;
+}
+
+// Vertices and triangles of one of the two lists.
+function unpackList(sections, name, { batches }, lattice) {
+  const places = unpackPlaces(sections, name, lattice);
   const [u, v] = ["u", "v"].map((axis) => sections.floats(`${name}.${axis}`));
   const uv = new Float32Array(2 * u.length);
   u.forEach((_, i) => { uv[2 * i] = u[i]; uv[2 * i + 1] = v[i]; });
@@ -118,11 +124,14 @@ class Distributions {
   constructor(sections, facts) {
     [this.faces, this.children, this.flat] = ["faces", "children", "leaf.flat"].map((name) => sections.bytes(name));
     this.axes = sections.words("leaf.axes");
+    // The bits of their numbers.
+    this.places = new Uint32Array(unpackPlaces(sections, "leaf", facts.lattice).buffer);
+    this.foci = ["xy", "z"].map((part) => sections.words(`leaf.focus.${part}`));
     this.channels = ["green", "red", "blue"].map((name) => sections.bytes(name));
     this.large = sections.words("large");
     this.colors = new Colors(facts);
     this.values = new Uint32Array(this.channels[0].length);
-    this.leaves = new Uint32Array(4 * this.faces.length);
+    this.leaves = new Uint32Array(8 * this.faces.length);
     this.nodes = new Uint32Array(4 * this.children.length + 64);
     [this.filled, this.firstValue, this.nextChildren, this.nextLarge] = [0, 0, 0, 0];
     this.met = 1;
@@ -248,7 +257,7 @@ class Distributions {
 
   // Writes the nodes of the leaf: its divided triangles, and undivided ones with midpoints.
   layOut() {
-    const { leaf, kept } = this;
+    const { leaf, kept, foci } = this;
     kept.count = 0;
     let [roots, below] = [0, 0];
     for (let face = 0; face < 8; face++) {
@@ -256,7 +265,10 @@ class Distributions {
       const isKept = this.faces[leaf] >> face & 1 ? this.copy(below++) : this.keep();
       roots |= isKept << face;
     }
-    this.leaves.set([this.axes[leaf], this.filled >> 1, this.firstValue, roots | this.flat[leaf] << 8], 4 * leaf);
+    const flags = roots | this.flat[leaf] << 8 | foci[1][leaf] << 16;
+    this.leaves.set([this.axes[leaf], this.filled >> 1, this.firstValue, flags], 8 * leaf);
+    this.leaves.set(this.places.subarray(3 * leaf, 3 * leaf + 3), 8 * leaf + 4);
+    this.leaves[8 * leaf + 7] = foci[0][leaf];
     for (let next = 0; next < kept.count; next++) {
       const at = 6 * next;
       const mask = kept.mask[next];

@@ -32,7 +32,7 @@ impl Lattice {
         Self { low: low.to_array(), step: ((high - low) / STEPS).to_array() }
     }
 
-    fn place(&self, position: Vec3) -> [u32; 3] {
+    pub(super) fn place(&self, position: Vec3) -> [u32; 3] {
         [0, 1, 2].map(|axis| {
             let steps = (position[axis] - self.low[axis]) / self.step[axis];
             // A scene may be flat; then it is not a number, and 0.
