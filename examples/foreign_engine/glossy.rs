@@ -106,6 +106,7 @@ fn reflect(field: &Field, patches: &[Patch], patch: usize, samples: &Incident, i
         return Exitant::default();
     }
     // Diffuse light is the engine's own.
-    let arrived = Arrived { irradiance, diffuse: Vec3::ZERO, spread: patches[patch].bend, negligible: 0.0 };
+    let arrived =
+        Arrived { irradiance, diffuse: Vec3::ZERO, spread: patches[patch].bend, negligible: 0.0, shown: false };
     field.reflect(&Leaves(patches), NodeId(patch as u32), &[samples], arrived)
 }

@@ -1,9 +1,11 @@
 //! The glossy light field: illumination samples in, directional distributions out, through the hooks alone.
 
+mod around;
+
 use crate::Rgb;
 use crate::basis::{Basis, Beyond, Known, Peak, Support};
 use crate::haar::{Haar, Refinement};
-use crate::outgoing::{Focus, Outgoing};
+use crate::outgoing::{Focus, Outgoing, SHOWN_COSINE};
 use crate::reflector::{Incident, Reflector, Ward};
 use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_close, merge_weak};
 use glam::Vec3;
@@ -26,6 +28,8 @@ const MIRROR_ALPHA: f32 = 0.03;
 const MOST_GAIN: f32 = 1.15;
 /// Samples are scaled up by at most this to add up to a leaf's irradiance.
 const MOST_BALANCE: f32 = 4.0;
+/// Places of a leaf whose normals differ by more than this (radians) from that of its middle see more than the middle does.
+const AROUND: f32 = 0.3;
 /// Of a leaf's samples, the directions of so many strongest ones are told to the projection as peaks.
 const PEAKS: usize = 12;
 
@@ -169,31 +173,45 @@ impl<B: Basis> GlossyField<B> {
         arrived: Arrived,
     ) -> Option<Reflection<'_>> {
         let material = self.material(hierarchy.material(leaf))?;
-        let place = Place::along(hierarchy.center(leaf), hierarchy.normals(leaf).axis, material.reflector.grain());
-        let mut incident = Vec::new();
-        arriving(hierarchy, leaf, path, &place, &mut incident);
-        if incident.is_empty() {
-            return None;
-        }
-        balance(&mut incident, arrived.irradiance);
+        let (center, normals) = (hierarchy.center(leaf), hierarchy.normals(leaf));
         let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
         // Normals that turn by an angle turn what is reflected by twice as much.
         let narrowest = (2.0 * arrived.spread).clamp(NARROWEST, FRAC_PI_2);
         // A lobe that is not round is narrower one way; a mirror shows everything.
         let is_wide = material.mirror.is_none() && material.reflector.grain().is_none();
-        merge_close(&mut incident, if is_wide { width.max(narrowest) } else { narrowest });
-        let focus = Focus::of(&incident, &place.frame);
-        merge_weak(&mut incident, width.max(narrowest));
-        // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
-        for sample in &mut incident {
-            sample.widen(if width < WIDE * narrowest { narrowest } else { 0.0 });
-            if sample.reach() * WIDE < width {
-                sample.shrink();
+        let close = if is_wide { width.max(narrowest) } else { narrowest };
+        let arrive = |normal: Vec3, irradiance: Option<Rgb>| {
+            let place = Place::along(center, normal, material.reflector.grain());
+            let mut incident = Vec::new();
+            arriving(hierarchy, leaf, path, &place, &mut incident);
+            if let Some(irradiance) = irradiance {
+                balance(&mut incident, irradiance);
             }
+            merge_close(&mut incident, close);
+            let focus = Focus::of(&incident, &place.frame);
+            merge_weak(&mut incident, width.max(narrowest));
+            // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
+            for sample in &mut incident {
+                sample.widen(if width < WIDE * narrowest { narrowest } else { 0.0 });
+                if sample.reach() * WIDE < width {
+                    sample.shrink();
+                }
+            }
+            (place, incident, focus)
+        };
+        let flat = hierarchy.is_flat(leaf);
+        let around = arrived.shown && !flat && normals.angle() > AROUND;
+        let (place, mut incident, focus) = arrive(normals.axis, (!around).then_some(arrived.irradiance));
+        if around {
+            let (below, lower, _) = arrive(-normals.axis, None);
+            incident = around::all(incident, lower, |direction| place.local(below.frame * direction));
+        }
+        if incident.is_empty() {
+            return None;
         }
         // A glossy part may be negative where the diffuse one overestimates; both together are not.
-        let (flat, least) = (hierarchy.is_flat(leaf), -arrived.diffuse);
-        Some(Reflection { material, place, incident, focus, narrowest, flat, least, negligible: arrived.negligible })
+        let (least, negligible) = (-arrived.diffuse, arrived.negligible);
+        Some(Reflection { material, place, incident, focus, narrowest, flat, around, least, negligible })
     }
 
     /// Represents what a leaf reflects in the basis.
@@ -248,7 +266,7 @@ impl Material {
 /// The strongest of the lobes that the samples make, in world directions.
 fn peaks(reflection: &Reflection<'_>) -> Vec<Peak> {
     let Reflection { material, place, incident, narrowest, .. } = reflection;
-    let mut strongest: Vec<&Incident> = incident.iter().filter(|i| i.direction.z > 0.05).collect();
+    let mut strongest: Vec<&Incident> = incident.iter().filter(|i| reflection.around || i.direction.z > 0.05).collect();
     let strength = |i: &Incident| i.irradiance.max_element() / (i.extent * i.extent + 1e-4);
     strongest.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     strongest.truncate(PEAKS);
@@ -256,9 +274,11 @@ fn peaks(reflection: &Reflection<'_>) -> Vec<Peak> {
         .into_iter()
         .map(|sample| {
             // By reciprocity the lobe of the incident direction is where it is reflected to.
-            let lobe = material.reflector.lobe(sample.direction);
+            let lobe = material.reflector.lobe(sample.direction.with_z(sample.direction.z.abs()));
             let mirrored = Vec3::new(-sample.direction.x, -sample.direction.y, sample.direction.z);
-            let (direction, width) = if material.mirror.is_some() {
+            let (direction, width) = if reflection.around {
+                (mirrored, lobe.width)
+            } else if material.mirror.is_some() {
                 (mirrored, MIRROR_ALPHA)
             } else {
                 (lobe.direction.try_normalize().unwrap_or(mirrored), lobe.width)
@@ -290,6 +310,8 @@ pub struct Reflection<'a> {
     narrowest: f32,
     /// Whether it is radiance rather than intensity per area.
     flat: bool,
+    /// Whether all around counts, for places with normals of their own: see [`around`].
+    around: bool,
     /// No less than what cancels the diffuse part.
     least: Rgb,
     /// What differs by less is not looked at, in the unit of the distribution.
@@ -326,16 +348,24 @@ impl Reflection<'_> {
     /// The same, and whether the reflector had to be overruled.
     fn clamped(&self, direction: Vec3) -> (Rgb, bool) {
         let outgoing = self.place.local(direction);
-        let reflected = self.material.reflect(&self.incident, outgoing);
+        let reflected = if self.around {
+            around::reflect(&self.incident, outgoing, |incident, outgoing| self.material.reflect(incident, outgoing))
+        } else {
+            self.material.reflect(&self.incident, outgoing)
+        };
         // What is not finite the projection itself replaces and counts.
         let radiance = if reflected.is_finite() { reflected.max(self.least) } else { reflected };
         let is_clamped = (radiance - reflected).cmpgt(CLAMPED * radiance.abs()).any();
-        (if self.flat { radiance } else { radiance * outgoing.z.max(0.0) }, is_clamped)
+        let least = if self.around { SHOWN_COSINE } else { 0.0 };
+        (if self.flat { radiance } else { radiance * outgoing.z.max(least) }, is_clamped)
     }
 
     /// Scales a distribution down to what the leaf can reflect of an irradiance: a projection that overestimates a narrow
-    /// lobe would let mirrors facing each other shine without end.
+    /// lobe would let mirrors facing each other shine without end. What is only shown may be more.
     pub fn conserve<B: Basis>(&self, exitant: &mut B, irradiance: Rgb) {
+        if self.around {
+            return;
+        }
         let power = if self.flat { exitant.cosine_integral(self.place.normal()) } else { exitant.integral() };
         let (power, most) = (power.element_sum(), MOST_GAIN * (self.material.albedo * irradiance).element_sum());
         if power > most {
@@ -345,6 +375,9 @@ impl Reflection<'_> {
 
     /// Where it is not zero.
     fn support(&self) -> Support {
+        if self.around {
+            return Support { cone: Cone::SPHERE, beyond: Beyond::Continued };
+        }
         Support {
             cone: Cone { axis: self.place.normal(), cos_angle: 1e-3 },
             beyond: if self.flat { Beyond::Continued } else { Beyond::Zero },

@@ -17,7 +17,7 @@ pub mod samples;
 pub use basis::Basis;
 pub use field::{GlossyField, Reflection};
 pub use hr_diffuse::{Rgb, hooks};
-pub use outgoing::{Focus, Outgoing};
+pub use outgoing::{Focus, Outgoing, SHOWN_COSINE};
 pub use reflector::{
     Compensated, Contour, Formula, Incident, Lambert, Lobe, MerlError, MetallicRoughness, Phong, Reflector,
     ReflectorError, Sample, Sum, Tabulated, Ward,

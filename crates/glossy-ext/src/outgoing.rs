@@ -15,6 +15,8 @@ const RIDGE: f64 = 3e-3;
 /// A place is at least this much of the middle's distance away from the plane of what lights the leaf: beyond it, or next to
 /// it, nothing is known.
 const NEAREST: f32 = 0.25;
+/// Of curved leaves distributions hold radiance times the cosine of the direction; where that is smaller, times this, if they are shown.
+pub const SHOWN_COSINE: f32 = 0.05;
 /// Larger components are no lengths.
 const MOST: f32 = 1e30;
 

@@ -167,6 +167,9 @@ pub struct Arrived {
     /// Differences of the leaf's exitant light by less than this, W/(m² sr), make no difference to what is asked for: 0
     /// where everything counts.
     pub negligible: f32,
+    /// Whether the leaf is only looked at, with each place's own normal, and sends no light on: then a curved one reflects what its
+    /// middle does not see, too.
+    pub shown: bool,
 }
 
 impl Arrived {

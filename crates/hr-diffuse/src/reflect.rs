@@ -270,7 +270,7 @@ impl<L: LightField> Solver<L> {
             })
             .collect();
         self.stats.skipped.converged_leaves += (leaves.len() - changed.len()) as u64;
-        let exitant = self.exitant_of(&changed, new, watch);
+        let exitant = self.exitant_of(&changed, new, false, watch);
         changed.truncate(exitant.len());
         for (Standing { leaf, negligible, .. }, exitant) in changed.iter().zip(exitant) {
             self.reflected[*leaf as usize] = exitant;
@@ -285,6 +285,7 @@ impl<L: LightField> Solver<L> {
         &self,
         leaves: &[Standing],
         new: Option<&[Rgb]>,
+        shown: bool,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Vec<L::Exitant> {
         let elements = &self.elements;
@@ -299,7 +300,12 @@ impl<L: LightField> Solver<L> {
             let element = &elements.nodes[leaf as usize];
             let irradiance = new.unwrap_or(&self.exitant.irradiance)[leaf as usize];
             let diffuse = irradiance * element.reflectance * FRAC_1_PI;
-            self.field.reflect(elements, NodeId(leaf), &path, Arrived { irradiance, diffuse, spread, negligible })
+            self.field.reflect(
+                elements,
+                NodeId(leaf),
+                &path,
+                Arrived { irradiance, diffuse, spread, negligible, shown },
+            )
         };
         let mut exitant: Vec<L::Exitant> = Vec::with_capacity(leaves.len());
         for part in leaves.chunks(BETWEEN_WATCHES * threads::current_num_threads()) {
@@ -329,7 +335,7 @@ impl<L: LightField> Solver<L> {
         let progress = self.progress(Phase::Transport, 0.9);
         let (mut done, mut stopped) = (0, false);
         let chunk = BETWEEN_WATCHES * threads::current_num_threads();
-        let exitant = self.exitant_of(&leaves, None, &mut || {
+        let exitant = self.exitant_of(&leaves, None, true, &mut || {
             let share = (done as f32 / leaves.len() as f32).min(1.0);
             done += chunk;
             let answer = watch(&Progress { fraction: progress.fraction + 0.04 * share, ..progress });

@@ -3,12 +3,9 @@
 
 use clap::ValueEnum;
 use glam::Vec3;
-use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector, arriving};
+use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector, SHOWN_COSINE, arriving};
 use hr_diffuse::{LightField, NodeId, Rgb, Solution};
 use std::f32::consts::FRAC_1_PI;
-
-/// Cosine below which a distribution says less and less about what is reflected: it is no longer divided by it.
-const LEAST_COSINE: f32 = 0.05;
 
 /// Lobes narrower than this (standard deviation in radians, about 8°) show more than samples tell: one of a link stands
 /// for too much of what is to be seen in them. Rays follow them where there are rays, as in the paper's final ray caster.
@@ -40,7 +37,7 @@ pub(crate) fn leaving<B: Basis>(solution: &Solution<GlossyField<B>>, leaf: NodeI
     let outgoing = &solution.reflected[leaf.index()];
     let from_middle = outgoing.focus.from_middle(at - element.center, seen);
     let cosine = from_middle.dot(axis);
-    let weight = (cosine / from_middle.length()).max(LEAST_COSINE);
+    let weight = (cosine / from_middle.length()).max(SHOWN_COSINE);
     if outgoing.is_empty() {
         return (carried(solution, leaf), weight);
     }

@@ -49,7 +49,7 @@ fn negligible_detail_is_left_out() {
     let (field, floor, incident, irradiance) = lit_floor();
     let reflect = |negligible| {
         let before = field.counters().brdf_evaluations();
-        let arrived = Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible };
+        let arrived = Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible, shown: false };
         let exitant = field.reflect(&floor, FLOOR, &[&incident], arrived);
         (exitant, field.counters().brdf_evaluations() - before)
     };
@@ -87,7 +87,7 @@ fn highlights_move_over_a_leaf_with_the_eye() {
     let (direction, irradiance) = (lamp.normalize(), Rgb::ONE);
     let mut incident = SampleSet::new();
     field.receive(&mut incident, &Transfer { sender: NodeId(1), direction, irradiance, oriented: true });
-    let arrived = Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible: 0.0 };
+    let arrived = Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible: 0.0, shown: false };
     let exitant = field.reflect(&floor, FLOOR, &[&incident], arrived);
     let far = Focus::default();
     // Where in a square of 1 the leaf shines most toward an eye.

@@ -40,7 +40,11 @@ pub(super) fn glossy_leaves(solution: &Solution<GlossyField>, step: usize) -> Ve
             let irradiance = solution.exitant.irradiance[leaf as usize];
             let diffuse = irradiance * nodes[leaf as usize].reflectance * FRAC_1_PI;
             let path = solution.incident_path(NodeId(leaf));
-            Leaf { node: NodeId(leaf), path, arrived: Arrived { irradiance, diffuse, spread: 0.0, negligible: 0.0 } }
+            Leaf {
+                node: NodeId(leaf),
+                path,
+                arrived: Arrived { irradiance, diffuse, spread: 0.0, negligible: 0.0, shown: false },
+            }
         })
         .collect()
 }

@@ -62,7 +62,13 @@ impl Host {
             direction: Vec3::Z,
             irradiance: Rgb::splat(2.0),
             oriented: true,
-            arrived: Arrived { irradiance: Rgb::splat(2.0), diffuse: Rgb::ZERO, spread: 0.0, negligible: 0.0 },
+            arrived: Arrived {
+                irradiance: Rgb::splat(2.0),
+                diffuse: Rgb::ZERO,
+                spread: 0.0,
+                negligible: 0.0,
+                shown: false,
+            },
             path: vec![0, 1],
             away: Some(Vec3::Z),
         }
