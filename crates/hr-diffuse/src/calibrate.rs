@@ -139,7 +139,7 @@ pub(crate) fn calibrate<L: LightField>(
 }
 
 /// By node, what is found over what it is compared with, by the observations at leaves or places: of each part as of its whole, as far as
-/// its own observations do not know better.
+/// its own observations do not know better. Together the parts change by what their whole does.
 pub(crate) fn factors(elements: &Elements, found: impl Iterator<Item = (u32, Sums)>, doubt: Doubt) -> Vec<f64> {
     let nodes = &elements.nodes;
     let mut sums = vec![Sums::default(); nodes.len()];
@@ -152,14 +152,27 @@ pub(crate) fn factors(elements: &Elements, found: impl Iterator<Item = (u32, Sum
     }
     let mut factors = vec![1.0_f64; nodes.len()];
     let mut ratios = vec![1.0_f64; nodes.len()];
-    for node in 0..nodes.len() {
-        let (above, off) = if node == 0 { (0, doubt.whole) } else { (nodes[node].parent as usize, doubt.part) };
-        // What tells a part from its whole is the difference of what was found: the whole has been told already.
-        (factors[node], ratios[node]) = (factors[above], ratios[above]);
-        if let Some((ratio, variance)) = sums[node].ratio(doubt.noise) {
-            let prior = (off * ratios[above]).powi(2);
-            factors[node] += (ratio - ratios[above]) * prior / (prior + variance).max(f64::MIN_POSITIVE);
-            ratios[node] = ratio;
+    // What tells a part from its whole is the difference of what was found: the whole has been told already.
+    let told = |sums: &Sums, (factor, ratio): (f64, f64), off: f64| match sums.ratio(doubt.noise) {
+        Some((own, variance)) => {
+            let prior = (off * ratio).powi(2);
+            (factor + (own - ratio) * prior / (prior + variance).max(f64::MIN_POSITIVE), own)
+        }
+        None => (factor, ratio),
+    };
+    (factors[0], ratios[0]) = told(&sums[0], (1.0, 1.0), doubt.whole);
+    for (node, element) in nodes.iter().enumerate() {
+        let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
+        let (mut brought, mut changed) = (0.0, 0.0);
+        for child in children.clone() {
+            (factors[child], ratios[child]) = told(&sums[child], (factors[node], ratios[node]), doubt.part);
+            brought += sums[child].brought;
+            changed += sums[child].brought * factors[child];
+        }
+        // Of parts the dim ones know the least: they keep what they are believed to be, and light would be lost.
+        let kept = factors[node] * brought / changed;
+        if kept.is_finite() && kept > 0.0 {
+            factors[children].iter_mut().for_each(|factor| *factor *= kept);
         }
     }
     factors
@@ -216,6 +229,30 @@ mod tests {
             let mean = mine().map(|(_, factor)| factor).sum::<f32>() / mine().count() as f32;
             assert!((mean - goal).abs() < 0.025, "{wall}: {mean}, {goal}");
         }
+    }
+
+    /// Of bright parts much is known, of dim ones little: what these lack must not be missing from all there is.
+    #[test]
+    fn parts_change_together_by_what_their_whole_does() {
+        let solver = room(0.5);
+        let leaves = || solver.elements.patch_leaves().enumerate();
+        let brought = |i: usize| if i.is_multiple_of(2) { 1.0 } else { 0.2 };
+        let mut sums = vec![Sums::default(); solver.elements.nodes.len()];
+        for (i, leaf) in leaves() {
+            for ray in 0..8 {
+                // All that is seen of the dim ones is in one ray of eight.
+                let found = if i.is_multiple_of(2) { 1.0 } else { f64::from(u8::from(ray == 0)) * 8.0 * 0.3 };
+                sums[leaf as usize].add(&Sums::of(found, brought(i)));
+            }
+        }
+        let found = leaves().map(|(_, leaf)| (leaf, sums[leaf as usize]));
+        let factors = super::factors(&solver.elements, found, OF_LINKS);
+        let (mut before, mut after) = (0.0, 0.0);
+        for (i, leaf) in leaves() {
+            (before, after) = (before + brought(i), after + brought(i) * factors[leaf as usize]);
+        }
+        assert!(factors[0] > 1.03, "something is missing: {}", factors[0]);
+        assert!((after / before - factors[0]).abs() < 1e-6, "{}, not {}", after / before, factors[0]);
     }
 
     #[test]

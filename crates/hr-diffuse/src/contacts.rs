@@ -16,11 +16,11 @@ use smallvec::{SmallVec, smallvec};
 use std::collections::HashMap;
 
 /// What stands above a leaf by less than this share of its radius …
-const GAP: f32 = 0.02;
+const GAP: f32 = 0.15;
 /// … and by less than this, in unit space, touches it.
-const MOST_GAP: f32 = 1e-3;
+const MOST_GAP: f32 = 0.01;
 /// A line counts from this share of a leaf's radius, …
-const LONG: f32 = 0.2;
+const LONG: f32 = 0.06;
 /// … and corners nearer than this share lie on it.
 const ON: f32 = 0.04;
 /// Polygons whose normals' cosine is larger than this lie in one plane.

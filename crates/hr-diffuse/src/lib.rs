@@ -20,6 +20,7 @@ pub mod error;
 mod exposed;
 pub mod facing;
 pub mod flat;
+mod footprint;
 pub mod form_factor;
 mod gather;
 pub mod geometry;

@@ -44,7 +44,7 @@ const EDGE_SHARE: f32 = 0.008;
 const CLUSTER_POINTS: u32 = 8;
 /// Leaves get no more than this times what a link brings on average. Surfaces that lie in one another's plane hide each
 /// other by turns, which no mean visibility can tell.
-const MOST_WEIGHT: f32 = 8.0;
+const MOST_WEIGHT: f32 = 64.0;
 
 /// Rays for a link that brings all light of a leaf; others in proportion, within limits. A single one tells nothing of
 /// the directions that matter more than others.

@@ -5,6 +5,7 @@
 
 use crate::calibrate::{OF_VERTICES, Sums, factors};
 use crate::contacts::Contacts;
+use crate::footprint::{Footprint, footprint};
 use crate::gather::{Group, carried, share};
 use crate::hooks::LightField;
 use crate::inherited::{Above, inherit};
@@ -101,8 +102,9 @@ pub(crate) fn reconstruct<L: LightField>(
                     };
                 }
                 let (afar, seed) = (&from_afar[vertex], seed(vertices.positions[vertex]));
+                let spots = || footprint(light, (&vertices, vertex as u32), (COVER, seed));
                 let gather = |place: (u32, Vec2)| {
-                    gather_at(light, (links, &spreads, &shares), place, (afar, near.of(place.0)), seed)
+                    gather_at(light, (links, &spreads, &shares), place, (afar, near.of(place.0)), (seed, &spots))
                 };
                 let mut gathering = gather((vertices.leaf[vertex], places[vertex]));
                 // What covers one of the leaves around need not cover another.
@@ -187,13 +189,14 @@ fn uncover(vertices: &mut Vertices, covered: &[bool]) {
     }
 }
 
-/// Irradiance at a point of a leaf, gathered over all links that light it.
+/// Irradiance at a point of a leaf, gathered over all links that light it; how much is seen of their senders from all over a footprint,
+/// which is asked for where that has to be found out.
 fn gather_at<L: LightField>(
     light: Light<'_, L>,
     (links, spreads, shares): (&Links, &[Spread], &[f32]),
     (leaf, uv): (u32, Vec2),
     (inherited, near): (&[Brought; 3], &[u32]),
-    seed: u32,
+    (seed, spots): (u32, &impl Fn() -> Footprint),
 ) -> Gathering {
     let element = light.element(leaf);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv);
@@ -225,6 +228,7 @@ fn gather_at<L: LightField>(
     let [_, emitters, rest] = inherited.map(|brought| brought.share);
     let (mut rays, mut row) = (0, Row { emitters, own: 0.0, inherited: rest });
     let mut known_here: SmallVec<[u32; 64]> = SmallVec::new();
+    let mut footprint: Option<Footprint> = None;
     // Share of the view through links of which it is proved how much they let through.
     let mut proved = 0.0;
     for Arriving { irradiance, share: view, mut visibility, sender } in arriving {
@@ -238,9 +242,15 @@ fn gather_at<L: LightField>(
             known_here.push(sender);
         }
         if renewed {
+            let spots = &footprint.get_or_insert_with(|| {
+                let found = spots();
+                rays += found.rays;
+                found
+            });
+            let from = |i: u32| spots.spot(known_here.len() as u32 + i).unwrap_or((x, n, element.source));
             let count = (share * RAYS).clamp(1.0, MOST_RAYS) as u32;
             rays += count;
-            visibility = visibility_at(light, (x, n, element.source), sender, count, seed);
+            visibility = visibility_at(light, from, sender, (count, seed));
         }
         let group = Group::of(light, sender);
         (if known { &mut own } else { &mut kept })[group as usize] += irradiance * visibility.abs();

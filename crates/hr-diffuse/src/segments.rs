@@ -1,6 +1,7 @@
 //! Segments between random points of two elements: how much of the sender does the receiver see?
 
 use crate::LightKind;
+use crate::footprint::Spot;
 use crate::geometry::{Domain, Geometry};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::LightField;
@@ -301,26 +302,28 @@ pub(crate) fn light_segment(scene: &SceneData, light: usize, x: Vec3, n: Vec3) -
     }
 }
 
-/// Share of a sender that a point with normal `n` on a surface sees, from `count` segments; 0 where none faces it.
+/// Share of a sender that is seen from some points, told by index, from `count` segments; 0 where none faces them.
 #[must_use]
 pub(crate) fn visibility_at<L: LightField>(
     Light { scene, elements, exitant, .. }: Light<'_, L>,
-    (x, n, surface): (Vec3, Vec3, u32),
+    from: impl Fn(u32) -> Spot,
     sender: u32,
-    count: u32,
-    seed: u32,
+    (count, seed): (u32, u32),
 ) -> f32 {
     let source = &elements.nodes[sender as usize];
     let mut blocker = u32::MAX;
     if source.kind == Kind::Light {
-        let (to, cosine) = light_segment(scene, source.source as usize, x, n);
-        let free = cosine > 0.0 && !scene.visibility.occluded(x, to, [surface, u32::MAX], &mut blocker);
-        return if free { 1.0 } else { 0.0 };
+        let mut is_free = |i: &u32| {
+            let (x, n, surface) = from(*i);
+            let (to, cosine) = light_segment(scene, source.source as usize, x, n);
+            cosine > 0.0 && !scene.visibility.occluded(x, to, [surface, u32::MAX], &mut blocker)
+        };
+        return (0..count).filter(|i| is_free(i)).count() as f32 / count.max(1) as f32;
     }
     let seed = hash(seed, sender);
     let segment = |i: u32, attempt: u32| {
         let (index, round) = (i + attempt * 0x1_0000, seed ^ attempt.wrapping_mul(0x9E37));
-        let choice = unit(hash(round ^ 0x68e3, i));
+        let (choice, (x, n, surface)) = (unit(hash(round ^ 0x68e3, i)), from(i));
         let s = draw(scene, elements, sender, (choice, point2(seed, index)), Density::Power(exitant), Some(x))?;
         between((x, n, surface), &s, s)
     };

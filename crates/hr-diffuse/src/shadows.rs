@@ -4,6 +4,7 @@
 //! corner of one. An edge that one leaf notices and the next does not looks torn, however little light that is. So the corners
 //! of a leaf look at whatever brings much of its light: where some see it and others do not, there is an edge in between.
 
+use crate::hierarchy::Kind;
 use crate::hooks::LightField;
 use crate::links::Links;
 use crate::refine::{MutableLight, Tolerance, can_split, estimate};
@@ -45,12 +46,14 @@ fn between<L: LightField>(
 ) -> (f32, u32) {
     let element = light.element(receiver);
     let middle = light.scene.surfaces()[element.source as usize].middle(element.domain);
+    // A light without extent is seen or not.
+    let count = if light.element(sender).kind == Kind::Light { 1 } else { SEGMENTS };
     let (mut least, mut most, mut rays) = (1.0_f32, 0.0_f32, 0);
     for uv in places {
         let (x, n) = point_on(light.scene, light.elements, receiver, uv.lerp(middle, INSET));
         // The same points of the sender for all.
-        let seen = visibility_at(light, (x, n, element.source), sender, SEGMENTS, receiver);
-        (least, most, rays) = (least.min(seen), most.max(seen), rays + SEGMENTS);
+        let seen = visibility_at(light, |_| (x, n, element.source), sender, (count, receiver));
+        (least, most, rays) = (least.min(seen), most.max(seen), rays + count);
     }
     let difference = most - least;
     (if difference > SOFT { difference } else { 0.0 }, rays)

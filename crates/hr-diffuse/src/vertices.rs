@@ -59,7 +59,7 @@ impl Vertices {
     }
 
     /// The triangles of a leaf's fans.
-    fn triangles(&self, leaf: u32) -> impl Iterator<Item = [&Corner; 3]> {
+    pub(crate) fn triangles(&self, leaf: u32) -> impl Iterator<Item = [&Corner; 3]> {
         self.fans(leaf).filter_map(<[Corner]>::split_first).flat_map(|(middle, outline)| {
             let next = outline.iter().cycle().skip(1);
             outline.iter().zip(next).map(move |(a, b)| [middle, a, b])

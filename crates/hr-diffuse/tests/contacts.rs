@@ -6,19 +6,20 @@ use std::ops::ControlFlow;
 
 /// Side of the wall, which stands in the plane y = 0.
 const SIDE: f64 = 2.0;
-/// How far the shelf reaches out.
+/// How far the shelf reaches out: one that hides half of the wall, and the frame of a picture.
 const DEPTH: f64 = 0.3;
+const FRAME: f64 = 0.02;
 const BULB: DVec3 = DVec3::new(1.1, 0.6, 3.0);
 /// The ends of the shelf, along the wall.
 const SHELVES: [[DVec2; 2]; 2] =
     [[DVec2::new(0.3, 1.13), DVec2::new(1.7, 1.13)], [DVec2::new(0.35, 0.9), DVec2::new(1.6, 1.35)]];
 
 /// A wall with a black shelf on it, a bulb above.
-fn solution([a, b]: [DVec2; 2]) -> Solution {
+fn solution([a, b]: [DVec2; 2], depth: f64) -> Solution {
     let at = |p: DVec2, y: f64| DVec3::new(p.x, y, p.y);
     let (x, z) = (DVec3::X * SIDE, DVec3::Z * SIDE);
     let wall = Shape::Quad([DVec3::ZERO, z, z + x, x]);
-    let shelf = Shape::Quad([at(a, 0.0), at(b, 0.0), at(b, DEPTH), at(a, DEPTH)]);
+    let shelf = Shape::Quad([at(a, 0.0), at(b, 0.0), at(b, depth), at(a, depth)]);
     let material = |reflectance| DiffuseMaterial { reflectance, exitance: Rgb::ZERO, two_sided: true };
     let input = SceneInput {
         surfaces: vec![Surface::new(wall, 0), Surface::new(shelf, 1)],
@@ -50,7 +51,7 @@ fn share(solution: &Solution, at: DVec2) -> f64 {
 fn light_ends_where_surfaces_meet() {
     const PLACES: u32 = 400;
     for (shelf @ [a, b], most) in SHELVES.into_iter().zip([0, 32]) {
-        let solution = solution(shelf);
+        let solution = solution(shelf, DEPTH);
         let up = (b - a).normalize().perp();
         let mut wrong = 0;
         for i in 0..PLACES {
@@ -66,11 +67,34 @@ fn light_ends_where_surfaces_meet() {
     }
 }
 
+/// A shadow that is narrower than leaves takes away as much light as it should, and not where vertices lie in it all of what is
+/// around them.
+#[test]
+fn narrow_shadows_are_as_dark_as_they_are_wide() {
+    const LOW: f64 = 0.3;
+    let shelf @ [a, b] = SHELVES[0];
+    let solution = solution(shelf, FRAME);
+    let (mut off, mut all, mut shown, mut there) = (0.0, 0.0, 0.0, 0.0);
+    for i in 0..200 {
+        let on = a.lerp(b, 0.1 + 0.8 * f64::from(i) / 199.0);
+        // The ray past the shelf's edge.
+        let width = FRAME * (BULB.z - on.y) / (BULB.y - FRAME);
+        for below in (0..100).map(|i| LOW * (f64::from(i) + 0.5) / 100.0) {
+            let truth = if below < width { 0.0 } else { 1.0 };
+            let found = share(&solution, on - DVec2::Y * below);
+            (off, all) = (off + (found - truth).abs(), all + 1.0);
+            (shown, there) = (shown + found, there + truth);
+        }
+    }
+    assert!(off / all < 0.0125, "off by {} of the light", off / all);
+    assert!((shown / there - 1.0).abs() < 0.05, "{} of the light", shown / there);
+}
+
 /// Whatever is cut, the parts make up the whole.
 #[test]
 fn parts_fill_the_wall() {
     for shelf in SHELVES {
-        let solution = solution(shelf);
+        let solution = solution(shelf, DEPTH);
         let (mut area, mut fans) = (0.0, [0, 0]);
         for leaf in solution.elements.patch_leaves() {
             let element = &solution.elements.nodes[leaf as usize];
