@@ -39,6 +39,8 @@ const RADIOSITY_SHARE: f32 = 0.5;
 const DIRECTIONAL_SHARE: f32 = 0.05;
 /// Leaves of surfaces that reflect directional light have normals within this angle (radians) of their middle.
 const MOST_BENT: f32 = 0.6;
+/// Mean cosine of a cluster's normals that is told from none: of what is seen edge-on.
+const LEAST_COSINE: f32 = 0.05;
 /// Share of a link's tolerance that its factor may be wrong by, …
 const FACTOR_SHARE: f32 = 0.05;
 /// … least and most that may be relative to the factor, …
@@ -314,17 +316,23 @@ fn inherited<L: LightField>(light: Light<'_, L>, candidate: &Candidate) -> Optio
     // A light without extent has no area, and no parts.
     let share = if from.sender == pair.sender { 1.0 } else { sender.area / whole.area };
     let visibility = if share < 1.0 { from.visibility.abs() } else { from.visibility };
-    let factor = (from.factor * share).min(most_factor(light.element(pair.receiver), sender));
+    let factor = (from.factor * share).min(most_factor(light, pair));
     Some(Link { receiver: pair.receiver, sender: pair.sender, factor, visibility })
 }
 
 /// Most that a link's factor may be: nobody takes up more than all of a view, nor more than all that is sent. F ≤ 1 and, by
-/// reciprocity, F ≤ Aₛ/Aᵣ; a few points of the receiver, or a link of something larger, may say otherwise.
-fn most_factor(receiver: &Element, sender: &Element) -> f32 {
+/// reciprocity, F ≤ Aₛ/Aᵣ; a few points of the receiver, or a link of something larger, may say otherwise. What a cluster emits
+/// is that of its area times the mean cosine of its normals.
+fn most_factor<L: LightField>(light: Light<'_, L>, pair: Pair) -> f32 {
+    let (receiver, sender) = (light.element(pair.receiver), light.element(pair.sender));
     match sender.kind {
         Kind::Light => f32::INFINITY,
         Kind::Front | Kind::Back if receiver.is_flat() => (sender.area / receiver.area).min(1.0),
-        _ => 1.0,
+        Kind::Front | Kind::Back => 1.0,
+        Kind::Cluster => {
+            let away = -light.direction_to(receiver.center, pair.sender);
+            sender.mean_cosine(away).max(LEAST_COSINE).recip()
+        }
     }
 }
 
@@ -451,7 +459,7 @@ fn decide<L: LightField>(
     let mut link = Link {
         receiver: pair.receiver,
         sender: pair.sender,
-        factor: mean_factor(light, pair, relative).min(most_factor(r, s)),
+        factor: mean_factor(light, pair, relative).min(most_factor(light, pair)),
         visibility: 0.0,
     };
     if link.factor <= 0.0 && bounds.max > 0.0 && !stopped {
@@ -546,10 +554,11 @@ fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) ->
     let distance = r.center.distance(s.center);
     // A cluster near by is not a point: what its parts make of irradiance says what it counts for as a whole.
     let whole = light.emitted(pair.sender, -direction).element_sum();
-    let resolve = s.kind == Kind::Cluster && s.radius > 0.25 * distance && whole > 0.0;
+    let near = s.radius > 0.25 * distance || light.is_misjudged(pair.sender, -direction);
+    let resolve = s.kind == Kind::Cluster && near && whole > 0.0;
     let factor_at = |x: Vec3, n: Vec3| {
         if resolve {
-            (light.irradiance_at(x, n, pair.sender).element_sum() / whole).min(1.0)
+            light.irradiance_at(x, n, pair.sender).element_sum() / whole
         } else {
             light.factor_at(x, n, pair.sender)
         }

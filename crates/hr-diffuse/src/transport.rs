@@ -14,6 +14,12 @@ use std::f32::consts::PI;
 /// at a point; else its children are.
 const CLUSTER_FAR: f32 = 0.25;
 
+/// Moments of normals that tell more or less than this share of what the surfaces of a cluster show in a direction are no good there: it
+/// is taken by its parts.
+const MISJUDGED: f32 = 0.03;
+/// Levels of parts that are looked at for it. Moments add up, so only that of surfaces tells something new.
+const PART_LEVELS: u32 = 3;
+
 /// Senders that cannot bring more than this share of a place's irradiance are negligible there.
 pub(crate) const NEGLIGIBLE: f32 = 1e-2;
 
@@ -50,6 +56,12 @@ pub struct Light<'a, L: LightField> {
     pub(crate) exitant: &'a Exitant,
     pub(crate) field: &'a L,
     pub(crate) reflected: &'a [L::Exitant],
+}
+
+/// Form factor toward so much area, all of which faces, at a squared distance; 1 where it is so near that there would be more. Nothing
+/// that grows toward 1 more softly will do: it takes a fourth of the light of a lamp that is a sphere of triangles, at 4 radii.
+fn afar(area: f32, distance2: f32) -> f32 {
+    (area / (PI * distance2)).min(1.0)
 }
 
 impl<L: LightField> Clone for Light<'_, L> {
@@ -97,6 +109,33 @@ impl<L: LightField> Light<'_, L> {
         match self.element(sender).kind {
             Kind::Cluster => radiosity * self.exitant.facing[sender as usize].mean_cosine(away),
             Kind::Light | Kind::Front | Kind::Back => radiosity,
+        }
+    }
+
+    /// Whether the diffuse light of a cluster in a direction is misjudged by the moments of its normals. Those of a box tell up to four times
+    /// too much of its narrow sides, and a tenth too little in between.
+    pub(crate) fn is_misjudged(&self, sender: u32, away: Vec3) -> bool {
+        if self.element(sender).kind != Kind::Cluster {
+            return false;
+        }
+        let by_moments = self.shown(sender, away, 0);
+        let by_parts = self.shown(sender, away, PART_LEVELS);
+        (by_moments - by_parts).abs() > MISJUDGED * by_parts
+    }
+
+    /// Diffuse power per solid angle (× π, sum of channels) of a node in a direction, by its parts so many levels down.
+    fn shown(&self, node: u32, away: Vec3, levels: u32) -> f32 {
+        let element = self.element(node);
+        match element.kind {
+            Kind::Light => 0.0,
+            Kind::Cluster if levels > 0 => {
+                let parts = element.first_child..element.first_child + element.child_count;
+                parts.map(|part| self.shown(part, away, levels - 1)).sum()
+            }
+            Kind::Cluster | Kind::Front | Kind::Back => {
+                let power = self.exitant.radiosity[node as usize].element_sum() * element.area;
+                power * self.exitant.facing[node as usize].mean_cosine(away)
+            }
         }
     }
 
@@ -208,7 +247,7 @@ impl<L: LightField> Light<'_, L> {
                 let to = element.center - x;
                 let d2 = to.length_squared().max(1e-20);
                 let cosine = to.dot(n) / d2.sqrt();
-                cosine.max(0.0) * element.area / (PI * d2 + element.area)
+                cosine.max(0.0) * afar(element.area, d2)
             }
             Kind::Front | Kind::Back => {
                 let geometry = &self.scene.surfaces()[element.source as usize];
@@ -264,8 +303,9 @@ impl<L: LightField> Light<'_, L> {
         }
         let distance = distance2.sqrt();
         let children = element.first_child..element.first_child + element.child_count;
+        let away = if distance > 0.0 { to / distance } else { element.normals.axis };
         let near = element.radius > CLUSTER_FAR * distance;
-        if near && !children.is_empty() {
+        if (near || self.is_misjudged(sender, away)) && !children.is_empty() {
             let resolve = element.kind == Kind::Cluster || {
                 let [low, high] = self.exitant.range[sender as usize];
                 element.active || (high - low).max_element() > 0.1 * high.max_element()
@@ -281,7 +321,6 @@ impl<L: LightField> Light<'_, L> {
         if factor <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
-        let away = if distance > 0.0 { to / distance } else { element.normals.axis };
         let light = match element.kind {
             Kind::Light => self.emitted(sender, away),
             _ => self.together(sender, away, self.directional_at(sender, (x, n), (factor, negligible))),
@@ -301,7 +340,7 @@ impl<L: LightField> Light<'_, L> {
         let element = self.element(sender);
         let distance2 = to.length_squared();
         let away = to / distance2.sqrt();
-        let factor = (-away.dot(n)).max(0.0) * element.area / (PI * distance2 + element.area);
+        let factor = (-away.dot(n)).max(0.0) * afar(element.area, distance2);
         let share = factor * element.mean_cosine(away);
         let even = self.exitant.radiosity[sender as usize] + self.exitant.directional[sender as usize];
         (even * share, share)
@@ -345,5 +384,95 @@ impl<L: LightField> Light<'_, L> {
     #[must_use]
     pub fn elements(&self) -> &Elements {
         self.elements
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::DVec3;
+    use std::ops::ControlFlow;
+
+    /// The faces of a box, seen from outside, or from inside of a room.
+    fn cuboid(low: DVec3, high: DVec3, inside: bool, material: u32) -> Vec<Surface> {
+        let [x, y, z] = DVec3::AXES.map(|axis| axis * (high - low).dot(axis));
+        let face = |at: DVec3, u: DVec3, v: DVec3| {
+            let (u, v) = if inside { (u, v) } else { (v, u) };
+            Surface::new(Shape::Quad([at, at + u, at + u + v, at + v]), material)
+        };
+        [(low, x, y), (low + z, y, x), (low, y, z), (low + x, z, y), (low, z, x), (low + y, x, z)]
+            .map(|(at, u, v)| face(at, u, v))
+            .to_vec()
+    }
+
+    /// A ball of 2 × 16 × 32 triangles.
+    fn ball(radius: f64) -> Vec<Surface> {
+        let at = |i: u32, j: u32| {
+            let (polar, around) = (f64::from(i) / 16.0 * std::f64::consts::PI, f64::from(j % 32) / 16.0);
+            let (sin, cos) = (around * std::f64::consts::PI).sin_cos();
+            DVec3::new(polar.sin() * cos, polar.sin() * sin, polar.cos()) * radius
+        };
+        let mut surfaces = Vec::new();
+        for (i, j) in (0..16).flat_map(|i| (0..32).map(move |j| (i, j))) {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            surfaces.extend((i < 15).then(|| Surface::new(Shape::Triangle([a, b, c]), 1)));
+            surfaces.extend((i > 0).then(|| Surface::new(Shape::Triangle([a, c, d]), 1)));
+        }
+        surfaces
+    }
+
+    fn solver(surfaces: Vec<Surface>, error: f32) -> Solver {
+        let wall = DiffuseMaterial { reflectance: Rgb::splat(0.7), exitance: Rgb::ZERO, two_sided: false };
+        let lamp = DiffuseMaterial { reflectance: Rgb::ZERO, exitance: Rgb::ONE, two_sided: false };
+        let input = SceneInput { surfaces, materials: vec![wall, lamp], ..SceneInput::default() };
+        Solver::new(&input, Settings::with_error(error), ()).expect("the scene is sound")
+    }
+
+    /// Lamps that are flat boxes, cubes and balls of triangles, far enough to be taken as wholes, against the sum of closed forms over their faces.
+    #[test]
+    fn lamps_of_many_surfaces_light_as_their_surfaces_do() {
+        let flat = cuboid(DVec3::new(-0.5, -0.5, -0.03), DVec3::new(0.5, 0.5, 0.03), false, 1);
+        let cube = cuboid(DVec3::splat(-0.5), DVec3::splat(0.5), false, 1);
+        for (what, lamp) in [("a flat box", flat), ("a cube", cube), ("a ball", ball(0.5))] {
+            let count = lamp.len();
+            let solver = solver(lamp, 0.1);
+            let (light, radius) = (solver.light(), solver.elements.nodes[0].radius);
+            for (far, angle) in (0..48).map(|i| (4.1_f32 * 1.2_f32.powi(i % 12), 0.37 * i as f32 + 0.1)) {
+                let (sin, cos) = angle.sin_cos();
+                let toward = Vec3::new(sin * 0.8, sin * 0.6, cos);
+                let (x, n) = (light.element(0).center + toward * (far * radius), -toward);
+                let face = |face: usize| solver.elements.surface_nodes[face][0];
+                let exact: f32 = (0..count).map(|i| light.factor_at(x, n, face(i))).sum();
+                let found = light.irradiance_at(x, n, 0).x;
+                // What is misjudged by less than 3 % is not resolved; the middle stands for all points, which is off by the second order.
+                let allowed = 0.03 + 0.5 / (far * far);
+                assert!((found / exact - 1.0).abs() < allowed, "{what}, {far} radii away: {found}, {exact}");
+            }
+        }
+    }
+
+    /// All that a flat lamp below a ceiling emits arrives at the walls.
+    #[test]
+    fn all_light_of_a_box_arrives() {
+        let mut surfaces = cuboid(DVec3::new(-2.0, -2.0, 0.0), DVec3::new(2.0, 2.0, 2.6), true, 0);
+        surfaces.extend(cuboid(DVec3::new(-0.4, -0.4, 2.4), DVec3::new(0.4, 0.4, 2.45), false, 1));
+        let mut solver = solver(surfaces, 0.1);
+        let go_on = &mut || ControlFlow::Continue(());
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        // One iteration from the dark.
+        solver.exitant.irradiance.fill(Rgb::ZERO);
+        solver.pull();
+        solver.iterate(false, go_on).expect("nobody breaks");
+        let power = |of: &[Rgb], lamp: bool| -> f32 {
+            let leaves = solver.elements.patch_leaves().map(|leaf| (&solver.elements.nodes[leaf as usize], leaf));
+            leaves
+                .filter(|(element, _)| (element.material == 1) == lamp)
+                .map(|(e, leaf)| e.area * of[leaf as usize].x)
+                .sum()
+        };
+        let (emitted, arrived) = (power(&solver.exitant.radiosity, true), power(&solver.exitant.irradiance, false));
+        // A fifth of the error asked for.
+        assert!((arrived / emitted - 1.0).abs() < 0.02, "{arrived} of {emitted} arrive");
     }
 }
