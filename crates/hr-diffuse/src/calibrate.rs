@@ -31,7 +31,14 @@ pub(crate) struct Doubt {
 /// Of what vertices gather, against the light of the leaves around.
 pub(crate) const OF_VERTICES: Doubt = Doubt { whole: 0.1, part: 0.05, noise: 0.2 };
 /// Of what links bring, against single rays.
-const OF_LINKS: Doubt = Doubt { whole: 0.1, part: 0.03, noise: 0.25 };
+pub(crate) const OF_LINKS: Doubt = Doubt { whole: 0.1, part: 0.03, noise: 0.25 };
+
+impl Doubt {
+    /// Of what links bring of emitted light in a solution with a relative error: their factors are as exact as that asks for.
+    pub(crate) fn of_emitted(error: f32) -> Self {
+        Self { whole: 0.3 * f64::from(error), part: 0.1 * f64::from(error), ..OF_LINKS }
+    }
+}
 
 /// Light is changed by no more than this factor, …
 const MOST: f64 = 1.2;
@@ -101,7 +108,7 @@ pub(crate) fn emitted<L: LightField>(
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
     brought: &[(u32, f32)],
-    rays: usize,
+    (rays, doubt): (usize, Doubt),
     find: impl Fn(u32, Start) -> f32 + Sync,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<(Vec<f32>, u64)> {
@@ -153,7 +160,7 @@ pub(crate) fn calibrate<L: LightField>(
         let part = found.len()..brought.len().min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
         found.par_extend(part.into_par_iter().with_min_len(8).map(look));
     }
-    let factors = factors(light.elements, brought.iter().map(|place| place.0).zip(found), OF_LINKS);
+    let factors = factors(light.elements, brought.iter().map(|place| place.0).zip(found), doubt);
     let factor = |&(place, _): &(u32, f32)| {
         let absorbed = (1.0 - f64::from(light.element(place).importance)) / (1.0 - REFLECTED);
         (1.0 + (factors[place as usize].clamp(MOST.recip(), MOST) - 1.0) * absorbed.clamp(0.0, 1.0)) as f32
@@ -238,7 +245,7 @@ mod tests {
         }
         let watch = &mut || ControlFlow::Continue(());
         let find = |_, start| reflected(light, start);
-        let (factors, shot) = calibrate(light, &brought, rays, find, watch).expect("nobody breaks");
+        let (factors, shot) = calibrate(light, &brought, (rays, OF_LINKS), find, watch).expect("nobody breaks");
         assert!(shot.abs_diff(rays as u64) < 2, "{shot} rays of {rays}");
         (brought.into_iter().map(|leaf| leaf.0).collect(), factors)
     }
@@ -290,7 +297,7 @@ mod tests {
             *brought *= if surface(*leaf) == 0 { 0.9 } else { 1.0 };
         }
         let (find, watch) = (|leaf, start| emitted(light, &emitters, leaf, start), &mut || ControlFlow::Continue(()));
-        let (factors, _) = calibrate(light, &brought, 100_000, find, watch).expect("nobody breaks");
+        let (factors, _) = calibrate(light, &brought, (100_000, OF_LINKS), find, watch).expect("nobody breaks");
         for (wall, goal) in [(0, 1.0 / 0.9), (2, 1.0), (3, 1.0)] {
             let mine = || brought.iter().zip(&factors).filter(|((leaf, _), _)| surface(*leaf) == wall);
             let mean = mine().map(|(_, factor)| factor).sum::<f32>() / mine().count() as f32;
@@ -318,7 +325,7 @@ mod tests {
         let solver = room(0.0);
         let light = solver.light();
         let nothing: Vec<(u32, f32)> = light.elements.patch_leaves().map(|leaf| (leaf, 0.0)).collect();
-        let answer = calibrate(light, &nothing, 100, |_, _| 0.0, &mut || ControlFlow::Continue(()));
+        let answer = calibrate(light, &nothing, (100, OF_LINKS), |_, _| 0.0, &mut || ControlFlow::Continue(()));
         assert_eq!(answer, Some((vec![1.0; nothing.len()], 0)));
     }
 }

@@ -1,7 +1,7 @@
 //! Gather: every receiver adds up what its links carry.
 
 use crate::Rgb;
-use crate::calibrate::{self, calibrate};
+use crate::calibrate::{self, Doubt, OF_LINKS, calibrate};
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::{LightField, NodeId, Transfer};
 use crate::inherited::Carried;
@@ -90,6 +90,9 @@ pub(crate) struct Gather {
     arriving: Vec<Rgb>,
 }
 
+/// Rays that are aimed at emitters tell as much as so many that look around.
+const TOWARD_EMITTERS: usize = 2;
+
 impl Gather {
     /// Prepares for a set of links; see [`Push::new`].
     pub(crate) fn new<L: LightField>(
@@ -126,8 +129,8 @@ impl Gather {
         gather
     }
 
-    /// Compares what arrives of diffusely reflected light, and of what surfaces emit, with what rays find, so many for each place that reflects any light, and
-    /// makes it so; returns the number of rays.
+    /// Compares what arrives of diffusely reflected light, and of what surfaces emit, with what rays find, so many for each place that
+    /// reflects any light, and makes it so; returns the number of rays.
     pub(crate) fn calibrate<L: LightField>(
         &mut self,
         light: Light<'_, L>,
@@ -144,11 +147,17 @@ impl Gather {
         }
         let places = self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count();
         let emitters = Emitters::new(light);
-        let direct = self.direct(light, links);
+        let (direct, doubt) = (self.direct(light, links), Doubt::of_emitted(self.push.error));
         let reflected = |_, start| calibrate::reflected(light, start);
         let emitted = |place, start| calibrate::emitted(light, &emitters, place, start);
-        let Some((factors, rays)) = calibrate(light, &brought, rays_each * places, reflected, watch) else { return 0 };
-        let Some((of_direct, also)) = calibrate(light, &direct, rays_each * places, emitted, watch) else { return 0 };
+        let Some((factors, rays)) = calibrate(light, &brought, (rays_each * places, OF_LINKS), reflected, watch) else {
+            return 0;
+        };
+        let Some((of_direct, also)) =
+            calibrate(light, &direct, (rays_each * places / TOWARD_EMITTERS, doubt), emitted, watch)
+        else {
+            return 0;
+        };
         for ((row, [factor, of_direct]), (_, diffuse)) in
             self.rows.iter_mut().zip(factors.into_iter().zip(of_direct).map(<[f32; 2]>::from)).zip(brought)
         {

@@ -322,17 +322,17 @@ fn inherited<L: LightField>(light: Light<'_, L>, candidate: &Candidate) -> Optio
 
 /// Most that a link's factor may be: nobody takes up more than all of a view, nor more than all that is sent. F ≤ 1 and, by
 /// reciprocity, F ≤ Aₛ/Aᵣ; a few points of the receiver, or a link of something larger, may say otherwise. What a cluster emits
-/// is that of its area times the mean cosine of its normals.
+/// diffusely is that of its area times the mean cosine of its normals; what it sends as directional light is not.
 fn most_factor<L: LightField>(light: Light<'_, L>, pair: Pair) -> f32 {
     let (receiver, sender) = (light.element(pair.receiver), light.element(pair.sender));
     match sender.kind {
         Kind::Light => f32::INFINITY,
         Kind::Front | Kind::Back if receiver.is_flat() => (sender.area / receiver.area).min(1.0),
-        Kind::Front | Kind::Back => 1.0,
-        Kind::Cluster => {
+        Kind::Cluster if !sender.active => {
             let away = -light.direction_to(receiver.center, pair.sender);
             sender.mean_cosine(away).max(LEAST_COSINE).recip()
         }
+        _ => 1.0,
     }
 }
 
@@ -554,8 +554,10 @@ fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) ->
     let distance = r.center.distance(s.center);
     // A cluster near by is not a point: what its parts make of irradiance says what it counts for as a whole.
     let whole = light.emitted(pair.sender, -direction).element_sum();
-    let near = s.radius > 0.25 * distance || light.is_misjudged(pair.sender, -direction);
-    let resolve = s.kind == Kind::Cluster && near && whole > 0.0;
+    // Directional light differs from what moments of normals say for other reasons: a factor that makes up for it would make spots.
+    let misjudged = !s.active && light.is_misjudged(pair.sender, -direction);
+    let near = s.radius > 0.25 * distance;
+    let resolve = s.kind == Kind::Cluster && (near || misjudged) && whole > 0.0;
     let factor_at = |x: Vec3, n: Vec3| {
         if resolve {
             light.irradiance_at(x, n, pair.sender).element_sum() / whole

@@ -472,7 +472,7 @@ mod tests {
                 .sum()
         };
         let (emitted, arrived) = (power(&solver.exitant.radiosity, true), power(&solver.exitant.irradiance, false));
-        // A fifth of the error asked for.
-        assert!((arrived / emitted - 1.0).abs() < 0.02, "{arrived} of {emitted} arrive");
+        // A third of the error asked for.
+        assert!((arrived / emitted - 1.0).abs() < 0.03, "{arrived} of {emitted} arrive");
     }
 }
