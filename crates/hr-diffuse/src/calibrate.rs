@@ -1,4 +1,4 @@
-//! Calibration: what arrives of emitted and of reflected light is compared with what rays find, region by region.
+//! Calibration: what arrives of reflected light is compared with what rays find, region by region.
 //!
 //! Rows of form factors (see [`leaf_rows`](crate::leaf_rows)) say how much is seen, not how bright it is: what is bright is
 //! seen by chance a little too much or too little, all over a region alike, and each bounce repeats it. Rays from all over a
@@ -8,13 +8,12 @@
 
 use crate::hierarchy::Elements;
 use crate::hooks::LightField;
-use crate::residual::{Emitters, diffuse_along};
+use crate::residual::diffuse_along;
 use crate::sampling::{cosine_direction, hash, point4, unit};
 use crate::segments::receiving_point;
 use crate::threads::{self, prelude::*};
 use crate::transport::Light;
-use crate::visibility::NO_BLOCKER;
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use std::ops::ControlFlow;
 
 /// What is believed before anything is compared, in relative terms.
@@ -31,14 +30,7 @@ pub(crate) struct Doubt {
 /// Of what vertices gather, against the light of the leaves around.
 pub(crate) const OF_VERTICES: Doubt = Doubt { whole: 0.1, part: 0.05, noise: 0.2 };
 /// Of what links bring, against single rays.
-pub(crate) const OF_LINKS: Doubt = Doubt { whole: 0.1, part: 0.03, noise: 0.25 };
-
-impl Doubt {
-    /// Of what links bring of emitted light in a solution with a relative error: their factors are as exact as that asks for.
-    pub(crate) fn of_emitted(error: f32) -> Self {
-        Self { whole: 0.3 * f64::from(error), part: 0.1 * f64::from(error), ..OF_LINKS }
-    }
-}
+const OF_LINKS: Doubt = Doubt { whole: 0.1, part: 0.03, noise: 0.25 };
 
 /// Light is changed by no more than this factor, …
 const MOST: f64 = 1.2;
@@ -82,34 +74,12 @@ impl Sums {
     }
 }
 
-/// A point of a place, with normal and surface; and what draws a ray there: a number of the place and one of the ray.
-pub(crate) type Start = ((Vec3, Vec3, u32), (u32, u32));
-
-/// What a ray from a place finds of diffusely reflected light (sum of channels), in a direction drawn by two numbers in 0…1.
-pub(crate) fn reflected<L: LightField>(light: Light<'_, L>, ((x, n, surface), (seed, ray)): Start) -> f32 {
-    let u = point4(seed, ray);
-    diffuse_along(light, x, cosine_direction(n, u.x, u.y), surface)
-}
-
-/// The same of light that surfaces emit, from a place.
-pub(crate) fn emitted<L: LightField>(
-    light: Light<'_, L>,
-    emitters: &Emitters,
-    place: u32,
-    (from, (seed, ray)): Start,
-) -> f32 {
-    let (u, choice) = (point4(seed, ray), unit(hash(hash(seed, 0x7e), ray)));
-    let toward = (emitters.seen_from(light, place), choice, Vec2::new(u.x, u.y));
-    emitters.along(light, from, toward, &mut NO_BLOCKER.clone()).unwrap_or_default()
-}
-
-/// Factors for light, in the order of the places in `brought`, each with what links bring of it (sum of channels); from so many rays,
-/// of each of which `find` tells what it finds of the same light at a place, and how many were shot. `None` where `watch` breaks.
+/// Factors for reflected light, in the order of the places in `brought`, each with what links bring of diffusely reflected light
+/// (sum of channels); from so many rays, and how many were shot. `None` where `watch` breaks.
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
     brought: &[(u32, f32)],
-    (rays, doubt): (usize, Doubt),
-    find: impl Fn(u32, Start) -> f32 + Sync,
+    rays: usize,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<(Vec<f32>, u64)> {
     let weight = |&(place, brought): &(u32, f32)| {
@@ -146,8 +116,8 @@ pub(crate) fn calibrate<L: LightField>(
         for ray in 0..count {
             let u = point4(seed, ray);
             let on = (unit(hash(hash(seed, 0x53), ray)), Vec2::new(u.z, u.w));
-            let Some(from) = receiving_point(light, place, on) else { continue };
-            let found = find(place, (from, (seed, ray)));
+            let Some((x, n, surface)) = receiving_point(light, place, on) else { continue };
+            let found = diffuse_along(light, x, cosine_direction(n, u.x, u.y), surface);
             sums.add(&Sums::of(each * f64::from(found), each * f64::from(brought)));
         }
         sums
@@ -160,7 +130,7 @@ pub(crate) fn calibrate<L: LightField>(
         let part = found.len()..brought.len().min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
         found.par_extend(part.into_par_iter().with_min_len(8).map(look));
     }
-    let factors = factors(light.elements, brought.iter().map(|place| place.0).zip(found), doubt);
+    let factors = factors(light.elements, brought.iter().map(|place| place.0).zip(found), OF_LINKS);
     let factor = |&(place, _): &(u32, f32)| {
         let absorbed = (1.0 - f64::from(light.element(place).importance)) / (1.0 - REFLECTED);
         (1.0 + (factors[place as usize].clamp(MOST.recip(), MOST) - 1.0) * absorbed.clamp(0.0, 1.0)) as f32
@@ -244,8 +214,7 @@ mod tests {
             *brought *= share(*leaf);
         }
         let watch = &mut || ControlFlow::Continue(());
-        let find = |_, start| reflected(light, start);
-        let (factors, shot) = calibrate(light, &brought, (rays, OF_LINKS), find, watch).expect("nobody breaks");
+        let (factors, shot) = calibrate(light, &brought, rays, watch).expect("nobody breaks");
         assert!(shot.abs_diff(rays as u64) < 2, "{shot} rays of {rays}");
         (brought.into_iter().map(|leaf| leaf.0).collect(), factors)
     }
@@ -287,25 +256,6 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_of_emitted_light_is_found() {
-        let solver = room(0.5);
-        let light = solver.light();
-        let surface = |leaf: u32| solver.elements.nodes[leaf as usize].source;
-        let emitters = Emitters::new(light);
-        let mut brought = solver.gather.direct(light, &solver.links);
-        for (leaf, brought) in &mut brought {
-            *brought *= if surface(*leaf) == 0 { 0.9 } else { 1.0 };
-        }
-        let (find, watch) = (|leaf, start| emitted(light, &emitters, leaf, start), &mut || ControlFlow::Continue(()));
-        let (factors, _) = calibrate(light, &brought, (100_000, OF_LINKS), find, watch).expect("nobody breaks");
-        for (wall, goal) in [(0, 1.0 / 0.9), (2, 1.0), (3, 1.0)] {
-            let mine = || brought.iter().zip(&factors).filter(|((leaf, _), _)| surface(*leaf) == wall);
-            let mean = mine().map(|(_, factor)| factor).sum::<f32>() / mine().count() as f32;
-            assert!((mean - goal).abs() < 0.025, "{wall}: {mean}, {goal}");
-        }
-    }
-
-    #[test]
     fn few_rays_change_little() {
         let solver = room(0.5);
         let (_, factors) = factors(&solver, |_| 1.0, 50);
@@ -325,7 +275,7 @@ mod tests {
         let solver = room(0.0);
         let light = solver.light();
         let nothing: Vec<(u32, f32)> = light.elements.patch_leaves().map(|leaf| (leaf, 0.0)).collect();
-        let answer = calibrate(light, &nothing, (100, OF_LINKS), |_, _| 0.0, &mut || ControlFlow::Continue(()));
+        let answer = calibrate(light, &nothing, 100, &mut || ControlFlow::Continue(()));
         assert_eq!(answer, Some((vec![1.0; nothing.len()], 0)));
     }
 }

@@ -1,7 +1,7 @@
 //! Gather: every receiver adds up what its links carry.
 
 use crate::Rgb;
-use crate::calibrate::{self, Doubt, OF_LINKS, calibrate};
+use crate::calibrate::calibrate;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::{LightField, NodeId, Transfer};
 use crate::inherited::Carried;
@@ -10,7 +10,6 @@ use crate::leaf_rows::balance;
 use crate::links::{Link, Links};
 use crate::places::Places;
 use crate::push::{self, Push, Spread, Weight, visible};
-use crate::residual::Emitters;
 use crate::shooting::Shot;
 use crate::threads::{self, prelude::*};
 use crate::transport::Light;
@@ -90,9 +89,6 @@ pub(crate) struct Gather {
     arriving: Vec<Rgb>,
 }
 
-/// Rays that are aimed at emitters tell as much as so many that look around.
-const TOWARD_EMITTERS: usize = 2;
-
 impl Gather {
     /// Prepares for a set of links; see [`Push::new`].
     pub(crate) fn new<L: LightField>(
@@ -129,8 +125,8 @@ impl Gather {
         gather
     }
 
-    /// Compares what arrives of diffusely reflected light, and of what surfaces emit, with what rays find, so many for each place that
-    /// reflects any light, and makes it so; returns the number of rays.
+    /// Compares what arrives of diffusely reflected light with what rays find, so many for each place that reflects any light, and
+    /// makes it so; returns the number of rays.
     pub(crate) fn calibrate<L: LightField>(
         &mut self,
         light: Light<'_, L>,
@@ -146,40 +142,14 @@ impl Gather {
             }
         }
         let places = self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count();
-        let emitters = Emitters::new(light);
-        let (direct, doubt) = (self.direct(light, links), Doubt::of_emitted(self.push.error));
-        let reflected = |_, start| calibrate::reflected(light, start);
-        let emitted = |place, start| calibrate::emitted(light, &emitters, place, start);
-        let Some((factors, rays)) = calibrate(light, &brought, (rays_each * places, OF_LINKS), reflected, watch) else {
-            return 0;
-        };
-        let Some((of_direct, also)) =
-            calibrate(light, &direct, (rays_each * places / TOWARD_EMITTERS, doubt), emitted, watch)
-        else {
-            return 0;
-        };
-        for ((row, [factor, of_direct]), (_, diffuse)) in
-            self.rows.iter_mut().zip(factors.into_iter().zip(of_direct).map(<[f32; 2]>::from)).zip(brought)
-        {
-            row[Group::Emitter as usize] *= of_direct;
+        let Some((factors, rays)) = calibrate(light, &brought, rays_each * places, watch) else { return 0 };
+        for ((row, factor), (_, diffuse)) in self.rows.iter_mut().zip(factors).zip(brought) {
             if diffuse > 0.0 {
                 row[Group::Rest as usize] *= factor;
                 row[Group::Faint as usize] *= factor;
             }
         }
-        rays + also
-    }
-
-    /// By place, what arrives there of light that surfaces emit, through links that [count as emitters'](Group::Emitter) (sum of
-    /// channels).
-    pub(crate) fn direct<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
-        let shares = light.reflected_shares();
-        let direct = self.by_place(light, links, |link, spread| {
-            let away = -light.direction_to(light.element(link.receiver).center, link.sender);
-            let factor = link.factor * visible(link, spread) * (1.0 - shares[link.sender as usize]);
-            light.diffuse(link.sender, away).element_sum() * factor
-        });
-        self.push.places.nodes.iter().copied().zip(direct).collect()
+        rays
     }
 
     /// Whether it was prepared for these links.

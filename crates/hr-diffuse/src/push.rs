@@ -82,7 +82,7 @@ pub(crate) struct Push {
     /// By link.
     pub(crate) spreads: Vec<Spread>,
     /// Relative error of the solution.
-    pub(crate) error: f32,
+    error: f32,
     /// By link: what it brings if it is wholly visible, where it is looked at closely (sum of channels).
     means: Vec<f32>,
     /// Links that would be looked at closely if they brought more.

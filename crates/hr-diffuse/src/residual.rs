@@ -154,10 +154,10 @@ pub(crate) fn residual<L: LightField>(
 }
 
 /// A few nodes.
-pub(crate) type Nodes = SmallVec<[u32; 8]>;
+type Nodes = SmallVec<[u32; 8]>;
 
 /// What emits.
-pub(crate) struct Emitters {
+struct Emitters {
     /// Power below each node, sum of channels, of what has an extent.
     power: Vec<f32>,
     /// Nodes of lights without extent.
@@ -169,7 +169,7 @@ pub(crate) struct Emitters {
 }
 
 impl Emitters {
-    pub(crate) fn new<L: LightField>(light: Light<'_, L>) -> Self {
+    fn new<L: LightField>(light: Light<'_, L>) -> Self {
         let is_light = |&node: &u32| light.element(node).kind == Kind::Light;
         let lights = (0..light.elements.nodes.len() as u32).filter(is_light).collect();
         let mut rooms = Vec::new();
@@ -186,38 +186,11 @@ impl Emitters {
     }
 
     /// Nodes below which is all that a leaf may see.
-    pub(crate) fn seen_from<L: LightField>(&self, light: Light<'_, L>, leaf: u32) -> Nodes {
+    fn seen_from<L: LightField>(&self, light: Light<'_, L>, leaf: u32) -> Nodes {
         match self.rooms.get(light.element(leaf).room as usize) {
             Some(&room) => self.outside.iter().copied().chain([room]).collect(),
             None => SmallVec::from_slice(&[0]),
         }
-    }
-
-    /// Irradiance at a point, with its normal and surface, by what is emitted below some nodes: an estimate by one ray, drawn by three
-    /// numbers in 0…1. `None` where none is shot.
-    pub(crate) fn along<L: LightField>(
-        &self,
-        light: Light<'_, L>,
-        (x, n, surface): (Vec3, Vec3, u32),
-        (nodes, choice, u): (Nodes, f32, Vec2),
-        blocker: &mut u32,
-    ) -> Option<f32> {
-        let (emitter, probability) = self.pick(light, nodes, x, choice)?;
-        let (at, normal) = point(light, emitter, u);
-        let to = at - x;
-        let d2 = to.length_squared();
-        let cosines = to.dot(n).max(0.0) * (-to.dot(normal)).max(0.0);
-        if cosines <= 0.0 || d2 <= 0.0 {
-            return None;
-        }
-        let hidden = light.scene.visibility.occluded(x, at, [surface, light.element(emitter).source], blocker);
-        let irradiance = self.power[emitter as usize] * (cosines / d2) / (PI * d2 * probability);
-        Some(if hidden { 0.0 } else { irradiance })
-    }
-
-    /// Whether anything with an extent emits.
-    pub(crate) fn any(&self) -> bool {
-        self.power[0] > 0.0
     }
 
     /// A leaf with extent below some nodes, drawn by its power over its squared distance from `x`, and the probability of that.
@@ -305,7 +278,7 @@ fn from_emitters<L: LightField>(
     leaf: u32,
     (seed, count): (u32, u32),
 ) -> (f32, u32) {
-    if !emitters.any() {
+    if emitters.power[0] <= 0.0 {
         return (0.0, 0);
     }
     let surface = light.element(leaf).source;
@@ -314,10 +287,19 @@ fn from_emitters<L: LightField>(
     for ray in 0..count {
         let u = point4(seed, ray);
         let (x, n) = point(light, leaf, Vec2::new(u.z, u.w));
-        let toward = (seen.clone(), unit(hash(seed, ray)), Vec2::new(u.x, u.y));
-        if let Some(irradiance) = emitters.along(light, (x, n, surface), toward, &mut blocker) {
+        let Some((emitter, probability)) = emitters.pick(light, seen.clone(), x, unit(hash(seed, ray))) else {
+            continue;
+        };
+        let (at, normal) = point(light, emitter, Vec2::new(u.x, u.y));
+        let to = at - x;
+        let d2 = to.length_squared();
+        let cosines = to.dot(n).max(0.0) * (-to.dot(normal)).max(0.0);
+        if cosines > 0.0 && d2 > 0.0 {
             rays += 1;
-            sum += irradiance;
+            let skip = [surface, light.element(emitter).source];
+            if !light.scene.visibility.occluded(x, at, skip, &mut blocker) {
+                sum += emitters.power[emitter as usize] * (cosines / d2) / (PI * d2 * probability);
+            }
         }
     }
     (sum / count as f32, rays)
