@@ -43,7 +43,8 @@ const EDGE_SHARE: f32 = 0.008;
 /// So many points of a place of many leaves.
 const CLUSTER_POINTS: u32 = 8;
 /// Leaves get no more than this times what a link brings on average. Surfaces that lie in one another's plane hide each
-/// other by turns, which no mean visibility can tell.
+/// other by turns, which no mean visibility can tell. A leaf in the peak of a lobe gets much more than the mean: with 8, an
+/// eighth of what a glossy sphere sends was cut off.
 const MOST_WEIGHT: f32 = 64.0;
 
 /// Rays for a link that brings all light of a leaf; others in proportion, within limits. A single one tells nothing of
