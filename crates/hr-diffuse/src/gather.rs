@@ -247,8 +247,9 @@ impl Gather {
         let mut open = vec![[0.0; GROUPS]; nodes.len()];
         for (index, &place) in self.push.places.nodes.iter().enumerate() {
             let row = self.rows[index].map(|factor| factor * light.element(place).area);
-            self.push
-                .each_weight(light, links, index, |at, weight| lit[at] += weight.value * row[self.groups[at] as usize]);
+            self.push.each_weight(light, links, index, |at, weight| {
+                lit[at] += weight.value * row[weight.group(self.groups[at]) as usize];
+            });
             open[place as usize] = row;
         }
         for node in (1..nodes.len()).rev() {

@@ -11,7 +11,7 @@ use crate::threads::prelude::*;
 use crate::transport::Light;
 
 /// Relative uncertainty of what arrives from emitters, through other links that leaves look at, and through those that they do
-/// not look at.
+/// not look at, of which all may be hidden.
 const UNCERTAIN: [f32; 3] = [0.02, 0.1, 0.5];
 /// No light is raised by more than this: where more is missing, it is not known from where.
 const MOST_RAISE: f32 = 3.0;
@@ -35,16 +35,26 @@ impl LeafRow {
     }
 
     /// Factors for the light of [lights without extent, and of each of the shares] that make the row's sum what it is to be; the
-    /// exposed part gets all of it. What is off is put down to each share by its uncertainty, as least squares do.
+    /// exposed part gets all of it. What is off is put down to each share by its uncertainty, as least squares do; what a share that is
+    /// nothing, or as much as it may be, leaves of that is put down to the others.
     fn factors(&self, sum: f32) -> [f32; GROUPS] {
         if self.exposed <= 0.0 {
             return [0.0; GROUPS];
         }
-        let off = sum - self.sum();
-        let variance = |i: usize| (UNCERTAIN[i] * self.shares[i]).powi(2);
-        let all: f32 = (0..3).map(variance).sum();
-        let balanced = |i: usize| 1.0 + off * variance(i) / (all * self.shares[i]).max(f32::MIN_POSITIVE);
-        let factors: [f32; 3] = std::array::from_fn(|i| balanced(i).clamp(MOST_RAISE.recip(), MOST_RAISE));
+        let mut factors = [1.0_f32; 3];
+        let mut free = [true; 3];
+        for _ in 0..3 {
+            let now: f32 = factors.iter().zip(self.shares).map(|(factor, share)| factor * share).sum();
+            let variance = |i: usize| if free[i] { (UNCERTAIN[i] * self.shares[i]).powi(2) } else { 0.0 };
+            let (off, all) = (sum - now, (0..3).map(variance).sum::<f32>());
+            let more: [f32; 3] =
+                std::array::from_fn(|i| off * variance(i) / (all * self.shares[i]).max(f32::MIN_POSITIVE));
+            for ((factor, more), free) in factors.iter_mut().zip(more).zip(&mut free) {
+                let goal = *factor + more;
+                *factor = goal.clamp(0.0, MOST_RAISE);
+                *free = *factor == goal;
+            }
+        }
         let now: f32 = factors.iter().zip(self.shares).map(|(factor, share)| factor * share).sum();
         let most = (sum / now.max(f32::MIN_POSITIVE)).min(1.0);
         let [emitters, rest, faint] = factors.map(|factor| factor * most / self.exposed);
@@ -138,6 +148,15 @@ mod tests {
         assert!((emitters * 0.9 - 1.0).abs() < 1e-6 && rest.is_finite(), "nothing else could be what is missing");
         let [.., faint] = factors([0.1, 0.1, 0.01], 1.0);
         assert!(faint <= MOST_RAISE, "so much may be missing elsewhere: {faint}");
+    }
+
+    #[test]
+    fn what_hides_the_rest_keeps_its_light() {
+        // Right above a lamp, where nobody looked whether all else is seen.
+        let row = [0.95, 0.05, 0.5];
+        let all @ [_, emitters, _, faint] = LeafRow { shares: row, exposed: 1.0 }.factors(1.0);
+        assert!((sum(row, all) - 1.0).abs() < 1e-6, "{all:?}");
+        assert!(emitters > 0.99 && faint < 0.02, "what is not known is not there: {all:?}");
     }
 
     #[test]

@@ -263,7 +263,7 @@ impl Push {
             let mut sums = inherited.on(self.places.middle(light.elements, place), &light.element(place).facing);
             let index = index[place as usize] as usize;
             self.each_weight(light, links, index, |at, weight| {
-                sums[groups[at] as usize] += carried[at] * weight.value;
+                sums[weight.group(groups[at]) as usize] += carried[at] * weight.value;
             });
             sums
         });
@@ -282,7 +282,7 @@ impl Push {
         let slope = |index: usize| {
             let mut slope = [T::default(); 3];
             self.each_weight(light, links, index, |at, weight| {
-                let arriving = carried[at] * rows[index][groups[at] as usize];
+                let arriving = carried[at] * rows[index][weight.group(groups[at]) as usize];
                 slope.iter_mut().zip(weight.slope.to_array()).for_each(|(slope, by)| *slope += arriving * by);
             });
             slope
@@ -336,6 +336,8 @@ pub(crate) struct Weight {
     pub(crate) value: f32,
     /// How it changes over a place of many leaves, per unit of length.
     slope: Vec3,
+    /// Whether the place did not look for itself how much it sees of the sender, as that brings next to nothing.
+    unseen: bool,
 }
 
 impl Weight {
@@ -344,7 +346,12 @@ impl Weight {
 
     fn of(kept: &[f32]) -> Self {
         let slope = if let [_, x, y, z] = *kept { Vec3::new(x, y, z) } else { Vec3::ZERO };
-        Self { value: kept[0], slope }
+        Self { value: kept[0].abs(), slope, unseen: kept[0].is_sign_negative() }
+    }
+
+    /// The group that it counts to at its place, of a link of a group: how much is seen of what lies beyond a lamp is not known there.
+    pub(crate) fn group(&self, of_link: Group) -> Group {
+        if self.unseen && of_link == Group::Rest { Group::Faint } else { of_link }
     }
 
     /// Not below 0 within a radius.
@@ -352,9 +359,11 @@ impl Weight {
         Self { slope: self.slope.clamp_length_max(self.value / radius.max(f32::MIN_POSITIVE)), ..self }
     }
 
+    /// The sign tells what was not seen: no weight is below 0.
     fn keep(self, kept: &mut [f32]) {
         let Vec3 { x, y, z } = self.slope;
-        kept.iter_mut().zip([self.value, x, y, z]).for_each(|(kept, number)| *kept = number);
+        let value = if self.unseen { -self.value } else { self.value };
+        kept.iter_mut().zip([value, x, y, z]).for_each(|(kept, number)| *kept = number);
     }
 }
 
@@ -362,7 +371,7 @@ impl Mul<f32> for Weight {
     type Output = Self;
 
     fn mul(self, factor: f32) -> Self {
-        Self { value: self.value * factor, slope: self.slope * factor }
+        Self { value: self.value * factor, slope: self.slope * factor, ..self }
     }
 }
 
@@ -401,13 +410,13 @@ impl Place {
         let value = self.turned(light, link) * known;
         let element = light.element(self.node);
         if element.is_patch() || light.elements.is_distant(NodeId(link.sender)) {
-            return Weight { value, slope: Vec3::ZERO };
+            return Weight { value, ..Weight::default() };
         }
         // (to·n) / d³ has the slope 3 (to·n) to / d⁵ − n / d³, of which the last part is not in the plane.
         let (middle, normal, _) = self.middle;
         let to = light.element(link.sender).center - middle;
         let slope = to.reject_from_normalized(normal) * (3.0 * value / to.length_squared().max(1e-12));
-        Weight { value, slope }.positive(element.radius)
+        Weight { value, slope, unseen: false }.positive(element.radius)
     }
 
     /// What a link brings that is wholly visible, where it varies over the place.
@@ -417,7 +426,7 @@ impl Place {
         let value = values.iter().sum();
         let element = light.element(self.node);
         if element.is_patch() {
-            return Weight { value, slope: Vec3::ZERO };
+            return Weight { value, ..Weight::default() };
         }
         // The plane that fits best: of (s, t) from the mean of the points, by the normal equations.
         let (u, v) = self.middle.1.any_orthonormal_pair();
@@ -436,7 +445,7 @@ impl Place {
         let slope = Vec2::new(tt * products.x - st * products.y, ss * products.y - st * products.x);
         let slope = (u * slope.x + v * slope.y) / (ss * tt - st * st).max(f32::MIN_POSITIVE);
         let value = (value + slope.dot(self.middle.0 - mean)).max(0.0);
-        Weight { value, slope }.positive(element.radius)
+        Weight { value, slope, unseen: false }.positive(element.radius)
     }
 
     /// The same as if the link's sender were seen as much of from everywhere.
@@ -461,22 +470,22 @@ impl Place {
         let reach = element.radius + sender.radius;
         let far = reach * reach < FAR * FAR * apart;
         if far && mean * visible * self.turned(light, link) < self.faint {
-            return (self.plain(light, link), 0);
+            return (Weight { unseen: link.visibility >= 0.0, ..self.plain(light, link) }, 0);
         }
         let shared = is_shared(light, link.receiver);
         let here = if !shared {
-            Weight { value: mean, slope: Vec3::ZERO }
+            Weight { value: mean, ..Weight::default() }
         } else if !element.is_patch() || !far && (mean * visible > self.much || !flat) {
             self.varying(light, link)
         } else if flat {
             let (x, n, _) = self.middle;
             let value = light.arriving_at(x, n, link.sender, self.negligible).0.element_sum();
-            Weight { value, slope: Vec3::ZERO }
+            Weight { value, ..Weight::default() }
         } else {
             let direction = light.direction_to(element.center, link.sender);
             let (irradiance, _) = light.arriving_at(element.center, direction, link.sender, self.negligible);
             let value = irradiance.element_sum() * element.mean_cosine(direction);
-            Weight { value, slope: Vec3::ZERO }
+            Weight { value, ..Weight::default() }
         };
         if here.value <= 0.0 {
             return (Weight::default(), 0);
