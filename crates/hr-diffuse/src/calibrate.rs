@@ -34,8 +34,9 @@ const OF_LINKS: Doubt = Doubt { whole: 0.1, part: 0.03, noise: 0.25 };
 
 /// Light is changed by no more than this factor, …
 const MOST: f64 = 1.2;
-/// … and by less where more than this share of it is reflected, in proportion to what is not: what is wrong is repeated many
-/// times there, and the rows' sums are right. So rows of form factors times reflectance stay below 1 if they were before.
+/// … and by less where more than this share of it is reflected, in proportion to what is not. So rows of form factors times
+/// reflectance stay below 1 if they were before. Within that what was found counts there as anywhere: what is wrong is repeated many
+/// times, and that the rows' sums are right does not tell which of what is seen is bright.
 const REFLECTED: f64 = 0.8;
 /// Places that a thread looks from between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 64;
@@ -133,7 +134,8 @@ pub(crate) fn calibrate<L: LightField>(
     let factors = factors(light.elements, brought.iter().map(|place| place.0).zip(found), OF_LINKS);
     let factor = |&(place, _): &(u32, f32)| {
         let absorbed = (1.0 - f64::from(light.element(place).importance)) / (1.0 - REFLECTED);
-        (1.0 + (factors[place as usize].clamp(MOST.recip(), MOST) - 1.0) * absorbed.clamp(0.0, 1.0)) as f32
+        let most = 1.0 + (MOST - 1.0) * absorbed.clamp(0.0, 1.0);
+        factors[place as usize].clamp(most.recip(), most) as f32
     };
     Some((brought.iter().map(factor).collect(), counts.iter().map(|(count, _)| u64::from(*count)).sum()))
 }
