@@ -1,5 +1,6 @@
 //! The glossy light field: illumination samples in, directional distributions out, through the hooks alone.
 
+mod albedos;
 mod around;
 
 use crate::Rgb;
@@ -8,11 +9,12 @@ use crate::haar::{Haar, Refinement};
 use crate::outgoing::{Focus, Outgoing, SHOWN_COSINE};
 use crate::reflector::{Incident, Reflector, Ward};
 use crate::samples::{IlluminationSample, Place, SampleSet, arriving, merge_close, merge_weak};
+use albedos::Albedos;
 use glam::Vec3;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
 use std::f32::consts::FRAC_PI_2;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// In light transport lobes are at least as wide as this makes them (standard deviation in radians, about 1.7°):
 /// what distributions of level 6 resolve. Narrower ones are followed by rays at display.
@@ -24,8 +26,13 @@ const FINEST: f32 = 0.85;
 const WIDE: f32 = 4.0;
 /// Slope of the lobe that stands for a perfect mirror in light transport.
 const MIRROR_ALPHA: f32 = 0.03;
-/// A leaf's glossy part reflects at most this times its mean albedo: directions differ, and projections err.
+/// A leaf's glossy part reflects at most this times its mean albedo: directions differ, and a smooth dielectric with a white
+/// diffuse part under it may reflect more than all of what grazes it.
 const MOST_GAIN: f32 = 1.15;
+/// Distributions that have less power than this share of what the mean albedo makes of an irradiance are not scaled to all they lack.
+const LEAST_POWER: f32 = 0.25;
+/// A distribution is scaled up by at most this to add up to what the samples make: one that has missed its lobes shows none.
+const MOST_SCALE: f32 = 2.0;
 /// Samples are scaled up by at most this to add up to a leaf's irradiance.
 const MOST_BALANCE: f32 = 4.0;
 /// Places of a leaf whose normals differ by more than this (radians) from that of its middle see more than the middle does.
@@ -51,6 +58,8 @@ struct Material {
     mirror: Option<Ward>,
     /// What is reflected beside the diffuse part.
     albedo: Rgb,
+    /// The same by direction, for those that any light reaches.
+    albedos: OnceLock<Albedos>,
 }
 
 /// Work counters.
@@ -145,6 +154,7 @@ impl<B: Basis> GlossyField<B> {
                         .then(|| Ward::new(Rgb::ZERO, mirror, MIRROR_ALPHA).ok())
                         .flatten(),
                     albedo,
+                    albedos: OnceLock::new(),
                 }
             })
         });
@@ -261,6 +271,13 @@ impl Material {
         }
         light
     }
+
+    /// Radiosity beside the diffuse one that samples make, whatever direction it leaves in.
+    fn reflected(&self, incident: &[Incident]) -> Rgb {
+        let albedos = self.albedos.get_or_init(|| Albedos::new(&*self.reflector));
+        let irradiance: Rgb = incident.iter().map(|sample| sample.irradiance).sum();
+        albedos.reflected(incident) + self.reflector.mirror() * irradiance
+    }
 }
 
 /// The strongest of the lobes that the samples make, in world directions.
@@ -360,16 +377,19 @@ impl Reflection<'_> {
         (if self.flat { radiance } else { radiance * outgoing.z.max(least) }, is_clamped)
     }
 
-    /// Scales a distribution down to what the leaf can reflect of an irradiance: a projection that overestimates a narrow
-    /// lobe would let mirrors facing each other shine without end. What is only shown may be more.
+    /// Scales a distribution to the power that its samples make, however coarse it is, and to no more than the leaf can reflect of an
+    /// irradiance: else mirrors facing each other would shine without end. What is only shown may be more.
     pub fn conserve<B: Basis>(&self, exitant: &mut B, irradiance: Rgb) {
         if self.around {
             return;
         }
         let power = if self.flat { exitant.cosine_integral(self.place.normal()) } else { exitant.integral() };
-        let (power, most) = (power.element_sum(), MOST_GAIN * (self.material.albedo * irradiance).element_sum());
-        if power > most {
-            exitant.scale(most / power);
+        let (power, mean) = (power.element_sum(), (self.material.albedo * irradiance).element_sum());
+        let made = self.material.reflected(&self.incident).element_sum().min(MOST_GAIN * mean);
+        // What is above zero here and below zero there may add up to next to nothing, of which no share is known.
+        let scale = 1.0 + (made - power) / power.max(LEAST_POWER * mean);
+        if power > 0.0 && scale > 0.0 {
+            exitant.scale(scale.min(MOST_SCALE));
         }
     }
 

@@ -47,11 +47,11 @@ fn lit_floor() -> (GlossyField, Floor, SampleSet, Rgb) {
 #[test]
 fn negligible_detail_is_left_out() {
     let (field, floor, incident, irradiance) = lit_floor();
-    let reflect = |negligible| {
+    let arrived = |negligible| Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible, shown: false };
+    let project = |negligible| {
         let before = field.counters().brdf_evaluations();
-        let arrived = Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible, shown: false };
-        let exitant = field.reflect(&floor, FLOOR, &[&incident], arrived);
-        (exitant, field.counters().brdf_evaluations() - before)
+        let reflection = field.reflection(&floor, FLOOR, &[&incident], arrived(negligible)).expect("it is lit");
+        (field.project(&reflection), field.counters().brdf_evaluations() - before)
     };
     let directions: Vec<Vec3> = (0..4000_u16)
         .map(|k| {
@@ -59,12 +59,12 @@ fn negligible_detail_is_left_out() {
             Vec2::from_angle(2.399_963_2 * f32::from(k)).extend(0.0) * (1.0 - z * z).sqrt() + Vec3::Z * z
         })
         .collect();
-    let (fine, all) = reflect(0.0);
+    let (fine, all) = project(0.0);
     let peak = directions.iter().map(|&d| fine.eval(d).x).fold(0.0, f32::max);
     assert_eq!(field.counters().negligible_detail(), 0, "everything counts");
     let mut before = all;
     for share in [0.02, 0.1, 0.5] {
-        let (coarse, evaluations) = reflect(share * peak);
+        let (coarse, evaluations) = project(share * peak);
         assert!(evaluations < before, "{evaluations} of {before} evaluations where {share} of the peak is negligible");
         before = evaluations;
         let worst = directions.iter().map(|&d| (coarse.eval(d) - fine.eval(d)).abs().x / peak).fold(0.0, f32::max);
@@ -72,9 +72,62 @@ fn negligible_detail_is_left_out() {
     }
     assert!(field.counters().negligible_detail() > 0 && 4 * before < all, "{before} of {all} evaluations");
     // Light as a whole stays: what cannot be told apart is still there.
-    let (nothing, _) = reflect(2.0 * peak);
-    let [some, right] = [&nothing, &fine].map(|exitant| exitant.cosine_integral(Vec3::Z).x);
-    assert!((some / right - 1.0).abs() < 0.25, "{some} W/m² of {right}");
+    let nothing = field.reflect(&floor, FLOOR, &[&incident], arrived(2.0 * peak)).distribution;
+    let [some, right] = [&nothing, &fine].map(|distribution| distribution.cosine_integral(Vec3::Z).x);
+    assert!((some / right - 1.0).abs() < 0.02, "{some} W/m² of {right}");
+}
+
+/// However coarse a distribution is, it has the power that its samples make: here a smooth dielectric, which reflects what
+/// grazes it up to twenty times as strongly as what comes from above.
+#[test]
+fn coarse_distributions_keep_their_power() {
+    let plastic: Arc<dyn Reflector> =
+        Arc::new(MetallicRoughness::new(Rgb::splat(0.5), 0.0, 0.18).expect("a dielectric").compensated());
+    let field = GlossyField::new(&[plastic], Refinement::default());
+    let turn = |k: f32| Vec3::new((2.4 * k).cos(), (2.4 * k).sin(), 0.04 * k + 0.02).normalize();
+    let floor = Floor { points: (0..40_u8).map(|k| turn(k.into())).collect() };
+    let (mut incident, mut irradiance) = (SampleSet::new(), Rgb::ZERO);
+    for (k, &direction) in floor.points.iter().enumerate() {
+        let sample = Rgb::splat(direction.z);
+        let sender = NodeId(k as u32 + 1);
+        field.receive(&mut incident, &Transfer { sender, direction, irradiance: sample, oriented: true });
+        irradiance += sample;
+    }
+    let diffuse = irradiance * (0.4 * std::f32::consts::FRAC_1_PI);
+    let arrived = Arrived { irradiance, diffuse, spread: 0.0, negligible: 0.1, shown: false };
+    let reflection = field.reflection(&floor, FLOOR, &[&incident], arrived).expect("it is lit");
+    let mut exact = Rgb::ZERO;
+    const STEPS: u16 = 400;
+    for (i, j) in (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| (i, j))) {
+        let [u, v] = [i, j].map(|i| (f32::from(i) + 0.5) / f32::from(STEPS));
+        let across = Vec2::from_angle(std::f32::consts::TAU * v) * u.sqrt();
+        exact += reflection.toward(across.extend((1.0 - u).sqrt()));
+    }
+    exact *= std::f32::consts::PI / f32::from(STEPS).powi(2);
+    let off = |distribution: &Haar| (distribution.cosine_integral(Vec3::Z) / exact - 1.0).x;
+    let mut distribution = field.project(&reflection);
+    let before = off(&distribution);
+    reflection.conserve(&mut distribution, irradiance);
+    let after = off(&distribution);
+    assert!(before.abs() > 0.1, "it is coarse: off by {before}");
+    assert!(after.abs() < 0.03, "off by {after}, {before} before");
+}
+
+/// A white metal that loses nothing between its facets reflects all, from wherever it comes; narrow lobes, too.
+#[test]
+fn albedos_of_white_metals_are_one() {
+    for roughness in [0.1, 0.3, 0.8] {
+        let metal = MetallicRoughness::new(Rgb::ONE, 1.0, roughness).expect("a metal").compensated();
+        let albedos = Albedos::new(&metal);
+        for k in 1..50_u8 {
+            let cos = 0.02 * f32::from(k);
+            let direction = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+            let sample = Incident { direction, irradiance: Rgb::ONE, ..Incident::default() };
+            let albedo = albedos.reflected(&[sample]).x;
+            let allowed = if cos < 0.1 { 0.05 } else { 0.02 };
+            assert!((albedo - 1.0).abs() < allowed, "roughness {roughness}, cosine {cos}: {albedo}");
+        }
+    }
 }
 
 /// One leaf under one lamp: where the highlight is seen is where a mirror would show the lamp.

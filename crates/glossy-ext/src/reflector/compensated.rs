@@ -2,6 +2,7 @@
 
 use super::error::clamped;
 use super::extent::Disk;
+use super::generic::albedo_by_samples;
 use super::ggx::{directional_albedo, mean_fresnel};
 use super::half_vector::cosine_range;
 use super::metallic_roughness::DIELECTRIC_F0;
@@ -184,6 +185,10 @@ impl Reflector for Compensated {
         // That of the diffuse term is in `diffuse`; of what the lobe loses 1 − Ē, m leaves.
         let further = self.further * (PI * self.losses.mean.x * self.losses.mean.x);
         self.single.glossy_albedo() + further
+    }
+
+    fn directional_albedo(&self, incident: Vec3) -> Rgb {
+        albedo_by_samples(self, incident)
     }
 
     fn lobe(&self, outgoing: Vec3) -> Lobe {

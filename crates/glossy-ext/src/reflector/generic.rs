@@ -1,7 +1,7 @@
 //! Numerical answers for reflectors that only give their values.
 
 use super::{HORIZON, Lobe, Reflector, above, mirrored, unit};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use hr_diffuse::Rgb;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -49,7 +49,7 @@ pub(super) fn albedo<R: Reflector + ?Sized>(r: &R) -> Rgb {
             let (s, c) = (TAU * (k as f32 + 0.25) / TURNS as f32).sin_cos();
             let sin = (1.0 - cos2).sqrt();
             let outgoing = Vec3::new(sin * c, sin * s, cos2.sqrt());
-            sum += albedo_toward(r, outgoing, peak(r, outgoing));
+            sum += albedo_toward(r, outgoing);
         }
     }
     sum / (COSINES * TURNS) as f32
@@ -59,7 +59,7 @@ pub(super) fn albedo<R: Reflector + ?Sized>(r: &R) -> Rgb {
 pub(super) fn lobe<R: Reflector + ?Sized>(r: &R, outgoing: Vec3) -> Lobe {
     let direction = peak(r, outgoing);
     let height = importance(r, direction, outgoing);
-    let energy = albedo_toward(r, outgoing, direction).max_element();
+    let energy = albedo_about(r, outgoing, direction).max_element();
     if !(height > 0.0 && energy > 0.0) {
         return Lobe::HEMISPHERE;
     }
@@ -113,9 +113,23 @@ fn peak<R: Reflector + ?Sized>(r: &R, outgoing: Vec3) -> Vec3 {
     best.0
 }
 
-/// Glossy reflectance toward one outgoing direction, integrated in rings about `middle` that grow with their angle, so
-/// that narrow lobes are resolved.
-fn albedo_toward<R: Reflector + ?Sized>(r: &R, outgoing: Vec3, middle: Vec3) -> Rgb {
+/// Directional-hemispherical reflectance of the glossy part, for one direction.
+pub(super) fn albedo_toward<R: Reflector + ?Sized>(r: &R, outgoing: Vec3) -> Rgb {
+    albedo_about(r, outgoing, peak(r, outgoing))
+}
+
+/// The same by the reflector's own [`sample`](Reflector::sample), where that follows the lobe.
+pub(super) fn albedo_by_samples<R: Reflector>(r: &R, outgoing: Vec3) -> Rgb {
+    const CELLS: usize = 24;
+    let drawn = (0..CELLS * CELLS).filter_map(|k| {
+        let u = Vec2::new((k % CELLS) as f32 + 0.5, (k / CELLS) as f32 + 0.5) / CELLS as f32;
+        r.sample(outgoing, u)
+    });
+    drawn.map(|sample| sample.weight).sum::<Rgb>() / (CELLS * CELLS) as f32
+}
+
+/// The same, integrated in rings about `middle` that grow with their angle, so that narrow lobes are resolved.
+fn albedo_about<R: Reflector + ?Sized>(r: &R, outgoing: Vec3, middle: Vec3) -> Rgb {
     const RINGS: usize = 64;
     const TURNS: usize = 24;
     const SMALLEST: f32 = 1e-4;

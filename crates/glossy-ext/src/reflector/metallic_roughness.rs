@@ -2,6 +2,7 @@
 
 use super::error::{ReflectorError, clamped, number, reflectance};
 use super::extent::{Disk, Meeting, ggx_over_disk};
+use super::generic::albedo_by_samples;
 use super::ggx::{density, distribution, draw, mean_albedo, schlick, visibility};
 use super::half_vector::HalfRange;
 use super::ward::slope_to_width;
@@ -224,6 +225,10 @@ impl Reflector for MetallicRoughness {
     fn glossy_albedo(&self) -> Rgb {
         // The remainder's mean is 0.
         self.f0 * (self.albedo - self.albedo_w) + Rgb::splat(self.albedo_w)
+    }
+
+    fn directional_albedo(&self, incident: Vec3) -> Rgb {
+        albedo_by_samples(self, incident)
     }
 
     fn lobe(&self, outgoing: Vec3) -> Lobe {

@@ -195,6 +195,16 @@ pub trait Reflector: Debug + Send + Sync {
         if self.is_diffuse() { Rgb::ZERO } else { generic::albedo(self) }
     }
 
+    /// Directional-hemispherical reflectance of the glossy part for light from one direction (by reciprocity also what it shows
+    /// of even light of radiance 1 toward there), per channel; without a [`mirror`](Self::mirror). Distributions are made to
+    /// add up to it.
+    ///
+    /// The default integrates numerically (about 2000 evaluations), good to some percent down to cosines of twice the lobe's
+    /// width.
+    fn directional_albedo(&self, incident: Vec3) -> Rgb {
+        if self.is_diffuse() || !above(incident) { Rgb::ZERO } else { generic::albedo_toward(self, incident) }
+    }
+
     /// Where incident light matters most for one outgoing direction.
     ///
     /// The default searches for the largest glossy × cosine (a coarse grid, the mirror direction and `outgoing`

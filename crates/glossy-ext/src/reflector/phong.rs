@@ -2,6 +2,7 @@
 
 use super::error::{ReflectorError, clamped, number, reflectance};
 use super::extent::{Disk, gaussian_over_disk};
+use super::generic::albedo_by_samples;
 use super::half_vector::cosine_range;
 use super::{Formula, HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
 use glam::{Vec2, Vec3};
@@ -185,6 +186,10 @@ impl Reflector for Phong {
 
     fn glossy_albedo(&self) -> Rgb {
         self.ks * self.unit_albedo
+    }
+
+    fn directional_albedo(&self, incident: Vec3) -> Rgb {
+        albedo_by_samples(self, incident)
     }
 
     fn lobe(&self, outgoing: Vec3) -> Lobe {

@@ -79,6 +79,10 @@ impl Reflector for Sum {
         self.glossy_albedo
     }
 
+    fn directional_albedo(&self, incident: Vec3) -> Rgb {
+        self.add(|part| part.directional_albedo(incident))
+    }
+
     /// That of the part which reflects most toward `outgoing` from its own lobe; mirrors win.
     fn lobe(&self, outgoing: Vec3) -> Lobe {
         if !above(outgoing) {

@@ -1,5 +1,6 @@
 //! Measured isotropic BRDFs.
 
+use super::generic::albedo_by_samples;
 use super::half_vector::HalfRange;
 use super::{HORIZON, Lobe, Reflector, Sample, above, cosine_hemisphere, generic, ggx, unit};
 use glam::{Vec2, Vec3};
@@ -326,6 +327,10 @@ impl Reflector for Tabulated {
 
     fn glossy_albedo(&self) -> Rgb {
         self.table.glossy_albedo
+    }
+
+    fn directional_albedo(&self, incident: Vec3) -> Rgb {
+        albedo_by_samples(self, incident)
     }
 
     fn lobe(&self, outgoing: Vec3) -> Lobe {

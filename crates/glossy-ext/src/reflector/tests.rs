@@ -216,6 +216,19 @@ fn glossy_albedo_is_the_mean_of_the_glossy_part() {
 }
 
 #[test]
+fn directional_albedo_is_that_of_quadrature() {
+    for r in wide() {
+        for theta in [0.0_f32, 0.5, 0.9, 1.2, 1.4, 1.5] {
+            let incident = direction(theta, 0.3);
+            let (expected, stated) = (hemisphere(|o| r.glossy(incident, o)), r.directional_albedo(incident));
+            let error = (stated - expected).abs().max_element();
+            assert!(error < 0.01 + 0.02 * expected.x.abs(), "{r:?}, {theta} rad: {stated}, integrated {expected}");
+        }
+        assert_eq!(r.directional_albedo(Vec3::new(0.6, 0.0, -0.8)), Rgb::ZERO, "{r:?}: below the horizon");
+    }
+}
+
+#[test]
 fn samples_reflect_what_quadrature_does() {
     const N: usize = 192;
     // Radiances that tell a wrong direction from a wrong weight.

@@ -2,6 +2,7 @@
 
 use super::error::{ReflectorError, clamped, direction, number, reflectance};
 use super::extent::{Disk, Meeting, gaussian_over_disk};
+use super::generic::albedo_by_samples;
 use super::half_vector::HalfRange;
 use super::{Formula, HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
 use glam::{Vec2, Vec3};
@@ -232,6 +233,10 @@ impl Reflector for Ward {
 
     fn glossy_albedo(&self) -> Rgb {
         self.rs * self.unit_albedo
+    }
+
+    fn directional_albedo(&self, incident: Vec3) -> Rgb {
+        albedo_by_samples(self, incident)
     }
 
     fn lobe(&self, outgoing: Vec3) -> Lobe {
