@@ -10,7 +10,7 @@ use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::links::{Link, Links};
 use crate::refine::Pair;
-use crate::reflect::Senders;
+use crate::reflect::{Representative, Senders};
 use crate::resume::Unfinished;
 use crate::rooms::Rooms;
 use crate::solution::Solution;
@@ -206,10 +206,8 @@ impl Exitant {
         out.put(&self.reflected_as)?;
         out.put(&self.gain)?;
         out.put(&self.peak)?;
-        let (leaves, shares): (Vec<u32>, Vec<f32>) = self.senders.standing.iter().copied().unzip();
         out.put(&self.senders.ranges)?;
-        out.put(&leaves)?;
-        out.put(&shares)
+        out.put(&self.senders.standing)
     }
 
     fn restore(nodes: usize, from: &mut Reader<'_>) -> Result<Self, FlatError> {
@@ -224,10 +222,7 @@ impl Exitant {
             reflected_as: from.take("nodes that stand for others")?,
             gain: from.take_finite("gains")?,
             peak: from.take_finite("peaks")?,
-            senders: Senders {
-                ranges: from.take(SENDERS)?,
-                standing: std::iter::zip(from.take::<u32>(SENDERS)?, from.take_finite::<f32>(SENDERS)?).collect(),
-            },
+            senders: Senders { ranges: from.take(SENDERS)?, standing: from.take(SENDERS)? },
         };
         let lengths = [
             exitant.radiosity.len(),
@@ -244,7 +239,10 @@ impl Exitant {
         fits(exitant.reflected_as.iter().all(|&node| (node as usize) < nodes), "nodes that stand for others")?;
         let Senders { ranges, standing } = &exitant.senders;
         let are_within = ranges.iter().all(|&[first, end]| first <= end && end as usize <= standing.len());
-        fits(are_within && standing.iter().all(|&(leaf, _)| (leaf as usize) < nodes), SENDERS)?;
+        let is_sound = |standing: &Representative| {
+            (standing.leaf as usize) < nodes && standing.share.is_finite() && standing.strength.is_finite()
+        };
+        fits(are_within && standing.iter().all(is_sound), SENDERS)?;
         Ok(exitant)
     }
 }

@@ -114,12 +114,13 @@ impl<L: LightField> Solver<L> {
         make_room(&mut exitant.reflected_as, || 0);
         exitant.reflected_as[GRAFT as usize] = GRAFT;
         make_room(&mut exitant.senders.ranges, || [0; 2]);
-        exitant.senders.standing.iter_mut().for_each(|(leaf, _)| *leaf = grafted(*leaf));
+        exitant.senders.standing.iter_mut().for_each(|standing| standing.leaf = grafted(standing.leaf));
         make_room(&mut self.incident, L::Incident::default);
         make_room(&mut self.reflected, L::Exitant::default);
         make_room(&mut self.brightest, || 0.0);
         make_room(&mut self.last_reflected, || Rgb::ZERO);
         make_room(&mut self.last_negligible, || 0.0);
+        make_room(&mut self.strengths, || 1.0);
         let count = self.elements.nodes.len();
         let exitant = &mut self.exitant;
         exitant.reflected_as.extend(exitant.reflected_as.len() as u32..count as u32);

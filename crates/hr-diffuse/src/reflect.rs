@@ -19,8 +19,11 @@ use std::ops::ControlFlow;
 
 /// So many leaves at most stand for all that are below a sender.
 const REPRESENTATIVES: usize = 16;
-/// A leaf's light is reflected anew once its irradiance has changed by this share of the error asked for.
-const REFLECT_SHARE: f32 = 1.0;
+/// A leaf's light is reflected anew once its irradiance has changed by this share: by then it may come from elsewhere, too. Before,
+/// the leaf sends what it reflected, in proportion to what arrives.
+const RESHAPED: f32 = 0.3;
+/// The same, once light has settled, as a share of the error asked for.
+const SETTLED_SHARE: f32 = 1.0;
 
 /// What changes the light that links carry by less than this share of what they may be wrong by is negligible in the light of
 /// the leaves that stand for their senders. These are up to sixteen, and each errs on its own.
@@ -37,15 +40,27 @@ const FINER: f32 = 0.5;
 const BETWEEN_WATCHES: usize = 8;
 
 /// Leaves, and the area that each stands for.
-type Representatives = SmallVec<[(u32, f32); 16]>;
+type Areas = SmallVec<[(u32, f32); 16]>;
+
+/// A leaf that stands for a sender, or for a part of it.
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Representative {
+    /// The leaf.
+    pub leaf: u32,
+    /// The share of the sender's area that it stands for.
+    pub share: f32,
+    /// How many times as much light arrives at it as when it was reflected: it sends so many times as much.
+    pub strength: f32,
+}
 
 /// Whose directional light the links ask for: for each node the leaves that stand for it.
 #[derive(Clone, Debug, Default)]
 pub struct Senders {
     /// By node: where its leaves are in `standing`. Empty for nodes that do not send.
     pub(crate) ranges: Vec<[u32; 2]>,
-    /// Leaves, and the share of the sender's area that each stands for.
-    pub(crate) standing: Vec<(u32, f32)>,
+    /// Those of all nodes.
+    pub(crate) standing: Vec<Representative>,
 }
 
 impl Senders {
@@ -62,7 +77,7 @@ impl Senders {
             below[node] |= below[nodes[node].parent as usize];
         }
         let mut senders = Self { ranges: vec![[0; 2]; nodes.len()], standing: Vec::new() };
-        let mut standing: Vec<Representatives> = vec![Representatives::new(); nodes.len()];
+        let mut standing: Vec<Areas> = vec![Areas::new(); nodes.len()];
         for node in (0..nodes.len()).rev() {
             let element = &nodes[node];
             if !below[node] || !element.active {
@@ -79,16 +94,18 @@ impl Senders {
             }
             if sends[node] {
                 let first = senders.standing.len() as u32;
-                senders.standing.extend(standing[node].iter().map(|&(leaf, area)| (leaf, area / element.area)));
+                let representative =
+                    |&(leaf, area): &(u32, f32)| Representative { leaf, share: area / element.area, strength: 1.0 };
+                senders.standing.extend(standing[node].iter().map(representative));
                 senders.ranges[node] = [first, senders.standing.len() as u32];
             }
         }
         senders
     }
 
-    /// The leaves that stand for a node, and their shares of its area.
+    /// The leaves that stand for a node.
     #[must_use]
-    pub fn of(&self, node: u32) -> &[(u32, f32)] {
+    pub fn of(&self, node: u32) -> &[Representative] {
         let [first, end] = self.ranges.get(node as usize).copied().unwrap_or_default();
         &self.standing[first as usize..end as usize]
     }
@@ -103,7 +120,11 @@ impl Senders {
             // between them, which show as blots where a sphere lights a floor.
             let share = (standing.len() as f32).sqrt().recip();
             let spread = (element.normals.angle() * share).max(0.0);
-            leaves.extend(standing.iter().map(|&(leaf, _)| Standing { leaf, spread, negligible: 0.0 }));
+            leaves.extend(standing.iter().map(|&Representative { leaf, .. }| Standing {
+                leaf,
+                spread,
+                negligible: 0.0,
+            }));
         }
         leaves.sort_unstable_by(|a, b| a.leaf.cmp(&b.leaf).then(a.spread.total_cmp(&b.spread)));
         leaves.dedup_by_key(|standing| standing.leaf);
@@ -121,12 +142,12 @@ struct Standing {
 }
 
 /// A few of many, in proportion to the area that they stand for.
-fn thinned(all: Vec<(u32, f32)>, seed: u32) -> Representatives {
+fn thinned(all: Vec<(u32, f32)>, seed: u32) -> Areas {
     if all.len() <= REPRESENTATIVES {
         return all.into_iter().collect();
     }
     let step = all.iter().map(|(_, area)| area).sum::<f32>() / REPRESENTATIVES as f32;
-    let mut chosen = Representatives::new();
+    let mut chosen = Areas::new();
     let mut passed = 0.0;
     let mut candidates = all.iter();
     let mut candidate = candidates.next();
@@ -170,9 +191,10 @@ impl<L: LightField> Solver<L> {
         let count = self.elements.nodes.len();
         self.last_reflected.resize(count, Rgb::splat(f32::NEG_INFINITY));
         self.last_negligible.resize(count, 0.0);
+        self.strengths.resize(count, 1.0);
         self.brightest.resize(count, 0.0);
         let (elements, faint) = (&self.elements, &self.faint);
-        let senders = Senders::new(elements, &self.links, |leaf| {
+        let mut senders = Senders::new(elements, &self.links, |leaf| {
             faint[elements.nodes[leaf as usize].material as usize] == Rgb::ZERO
         });
         let mut leaves = senders.leaves(elements);
@@ -197,9 +219,26 @@ impl<L: LightField> Solver<L> {
                 self.last_reflected[node] = Rgb::splat(f32::NEG_INFINITY);
             }
         }
+        if new.is_none() {
+            senders.standing.iter_mut().for_each(|standing| standing.strength = self.strength(standing.leaf));
+        }
         self.exitant.senders = senders;
         self.refer(&changed);
         !changed.is_empty()
+    }
+
+    /// How many times as much light arrives at a leaf as when it was reflected, in steps.
+    fn strength(&mut self, leaf: u32) -> f32 {
+        let [now, last] = [&self.exitant.irradiance, &self.last_reflected].map(|of| of[leaf as usize].element_sum());
+        let (strength, before) = (now / last, &mut self.strengths[leaf as usize]);
+        // Were it to follow each change, of lobes that mirror each other less would die out than their surfaces take up.
+        if last > 0.0
+            && strength.is_finite()
+            && (strength - *before).abs() > SETTLED_SHARE * self.settings.error * *before
+        {
+            *before = strength;
+        }
+        *before
     }
 
     /// Finds out which differences of the light of leaves are too small for any link to tell: what a link makes of them counts
@@ -215,7 +254,7 @@ impl<L: LightField> Solver<L> {
         }
         let mut by_leaf = vec![0.0_f32; count];
         for (node, counts) in by_node.into_iter().enumerate() {
-            for &(leaf, share) in senders.of(node as u32) {
+            for &Representative { leaf, share, .. } in senders.of(node as u32) {
                 let most = &mut by_leaf[leaf as usize];
                 *most = most.max(PI * share * counts);
             }
@@ -242,7 +281,8 @@ impl<L: LightField> Solver<L> {
         for node in 0..self.elements.nodes.len() {
             let standing = self.exitant.senders.of(node as u32);
             let parent = self.elements.nodes[node].parent as usize;
-            self.exitant.peak[node] = standing.iter().map(|&(leaf, share)| self.brightest[leaf as usize] * share).sum();
+            let brightest = |of: &Representative| self.brightest[of.leaf as usize] * of.share * of.strength;
+            self.exitant.peak[node] = standing.iter().map(brightest).sum();
             self.exitant.reflected_as[node] =
                 if standing.is_empty() && node > 0 { self.exitant.reflected_as[parent] } else { node as u32 };
         }
@@ -256,7 +296,12 @@ impl<L: LightField> Solver<L> {
         new: Option<&[Rgb]>,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Vec<u32> {
-        let tolerance = self.settings.error * if new.is_some() { NEW_SHARE } else { REFLECT_SHARE };
+        let settled = SETTLED_SHARE * self.settings.error;
+        let tolerance = match new {
+            Some(_) => NEW_SHARE * self.settings.error,
+            None if self.reflects_finely => settled,
+            None => settled.max(RESHAPED),
+        };
         let mut changed: Vec<Standing> = leaves
             .iter()
             .copied()
@@ -276,6 +321,7 @@ impl<L: LightField> Solver<L> {
             self.reflected[*leaf as usize] = exitant;
             self.last_negligible[*leaf as usize] = *negligible;
             self.last_reflected[*leaf as usize] = self.exitant.irradiance[*leaf as usize];
+            self.strengths[*leaf as usize] = 1.0;
         }
         changed.into_iter().map(|standing| standing.leaf).collect()
     }

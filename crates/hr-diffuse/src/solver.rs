@@ -165,6 +165,8 @@ pub struct Solver<L: LightField = ()> {
     strong: Vec<Rgb>,
     /// Irradiance of each leaf when its light was last reflected by the extension.
     pub(crate) last_reflected: Vec<Rgb>,
+    /// By leaf, [`strength`](crate::reflect::Representative::strength).
+    pub(crate) strengths: Vec<f32>,
     /// What was negligible of it then ([`Arrived::negligible`](crate::hooks::Arrived)).
     pub(crate) last_negligible: Vec<f32>,
     /// Directional light of leaves as it is to be shown: in its own detail, also where it stands for others.
@@ -173,6 +175,8 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) shot: Option<Shot>,
     /// What links may carry of directional light: see [`columns`](crate::columns).
     pub(crate) most_reflected: f32,
+    /// Whether leaves are reflected anew where little has changed, too.
+    pub(crate) reflects_finely: bool,
     /// Largest radiance of each leaf's directional light (max channel).
     pub(crate) brightest: Vec<f32>,
     /// Area whose light counts.
@@ -253,10 +257,12 @@ impl<L: LightField> Solver<L> {
             faint,
             strong,
             last_reflected: Vec::new(),
+            strengths: Vec::new(),
             last_negligible: Vec::new(),
             shown: Vec::new(),
             shot: None,
             most_reflected: FREELY,
+            reflects_finely: false,
             brightest: Vec::new(),
             area,
             convergence: Convergence::default(),
@@ -394,7 +400,8 @@ impl<L: LightField> Solver<L> {
         }
         let account = self.account;
         let mut before = self.begin_shooting(reflects);
-        let mut settled = false;
+        // Light settles with what leaves have reflected of much of it, and once more with what all reflect of all of it.
+        let (mut settled, mut finely) = (false, !reflects || self.shot.is_some());
         for iteration in 0..if before.is_some() { MOST_ITERATIONS } else { most } {
             let fraction = pass.fraction(0.6 + 0.3 * (iteration as f32 / (iteration as f32 + 4.0)));
             let progress = self.progress(Phase::Transport, fraction);
@@ -403,15 +410,19 @@ impl<L: LightField> Solver<L> {
                 if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
             let Some(residual) = self.iterate(reflects, ask) else { break };
-            before = None;
+            (before, self.reflects_finely) = (None, false);
             if self.grows(iteration) {
                 self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
             }
             settled = self.remaining(residual) < share * self.settings.error && iteration > 0;
+            if settled && !finely {
+                (settled, finely, self.reflects_finely) = (false, true, true);
+            }
             if *stopped || settled || account.is_over() {
                 break;
             }
         }
+        self.reflects_finely = false;
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         self.finish_shooting(reflects, settled, before, &mut || {
             *stopped = *stopped || watch(&progress).is_break();
@@ -591,7 +602,7 @@ impl<L: LightField> Solver<L> {
             moved += weight * delta.abs();
             total += weight * now.as_dvec3();
         }
-        // Directional light comes in steps, when it is reflected anew: those are no series.
+        // Directional light comes in steps: those are no series.
         let ahead = if self.elements.nodes[0].active { Rgb::ZERO } else { self.convergence.ahead(change) };
         if ahead != Rgb::ZERO {
             let leaves: Vec<u32> = self.elements.patch_leaves().collect();

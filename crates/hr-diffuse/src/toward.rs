@@ -7,6 +7,7 @@ use crate::Rgb;
 use crate::hierarchy::Kind;
 use crate::hooks::LightField;
 use crate::push::sample_points;
+use crate::reflect::Representative;
 use crate::transport::Light;
 use glam::Vec3;
 use smallvec::{SmallVec, smallvec};
@@ -89,7 +90,7 @@ impl<L: LightField> Light<'_, L> {
         let places = standing.len().max(own.len());
         for pair in 0..places * points.len().min(PAIRS.div_ceil(places)) {
             let (place, turn) = (pair % places, pair / places);
-            let (leaf, share) = standing[place % standing.len()];
+            let Representative { leaf, share, strength } = standing[place % standing.len()];
             let (x, n, weight) = points[(place + turn) % points.len()];
             let part = self.element(leaf);
             let at = if own.is_empty() { part.center } else { own[place % own.len()].0 };
@@ -105,7 +106,7 @@ impl<L: LightField> Light<'_, L> {
             all += kernel;
             seen += kernel * if part.is_flat() { facing } else { part.mean_cosine(-toward).max(LEAST_COSINE) };
             if facing > 0.0 {
-                sum += self.field.radiance(&self.reflected[leaf as usize], -toward) * (facing * kernel * PI);
+                sum += self.field.radiance(&self.reflected[leaf as usize], -toward) * (strength * facing * kernel * PI);
             }
         }
         // Intensity per area over the mean cosine is mean radiance.
@@ -113,7 +114,7 @@ impl<L: LightField> Light<'_, L> {
         if over <= 0.0 {
             return Rgb::ZERO;
         }
-        sum * (standing.iter().map(|(_, share)| share).sum::<f32>() / over)
+        sum * (standing.iter().map(|standing| standing.share).sum::<f32>() / over)
     }
 }
 
@@ -163,7 +164,8 @@ mod tests {
         let nodes = [0, 1].map(|surface| solver.elements.surface_nodes[surface][0]);
         let mut ranges = vec![[0; 2]; solver.elements.nodes.len()];
         ranges[nodes[0] as usize] = [0, 1];
-        solver.exitant.senders = Senders { ranges, standing: vec![(nodes[0], 1.0)] };
+        solver.exitant.senders =
+            Senders { ranges, standing: vec![Representative { leaf: nodes[0], share: 1.0, strength: 1.0 }] };
         solver.exitant.reflected_as = (0..solver.elements.nodes.len() as u32).collect();
         solver.exitant.peak.fill(FRAC_1_PI);
         (solver, nodes)

@@ -5,7 +5,7 @@ use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField, NodeId};
 use crate::links::Link;
 use crate::oracle::spot_ramp;
-use crate::reflect::Senders;
+use crate::reflect::{Representative, Senders};
 use crate::{Cone, Facing, LightKind, Rgb};
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -148,12 +148,12 @@ impl<L: LightField> Light<'_, L> {
         let state = self.exitant.reflected_as[sender as usize];
         let holder = self.element(state);
         let mut light = Rgb::ZERO;
-        for &(leaf, share) in self.exitant.senders.of(state) {
+        for &Representative { leaf, share, strength } in self.exitant.senders.of(state) {
             let part = self.element(leaf);
             // Radiance of a plane becomes intensity per area.
             let cosine = if part.is_flat() && !holder.is_flat() { part.normals.axis.dot(away).max(0.0) } else { 1.0 };
             if cosine > 0.0 {
-                light += self.field.radiance(&self.reflected[leaf as usize], away) * (cosine * share * PI);
+                light += self.field.radiance(&self.reflected[leaf as usize], away) * (cosine * share * strength * PI);
             }
         }
         // Intensity per area over the mean cosine is mean radiance; near the terminator both fade.
@@ -181,12 +181,13 @@ impl<L: LightField> Light<'_, L> {
             let holder = self.element(state);
             // Intensity per area is at most the mean cosine times radiance, and that is at most 1.
             let scale = if holder.is_flat() { PI } else { PI / holder.mean_cosine(away.axis).max(0.25) };
-            for &(leaf, share) in self.exitant.senders.of(state) {
+            for &Representative { leaf, share, strength } in self.exitant.senders.of(state) {
                 let (least, most) = self.field.radiance_bounds(&self.reflected[leaf as usize], away);
                 let part = self.element(leaf);
                 let (dim, bright) =
                     if part.is_flat() && !holder.is_flat() { part.normals.cosines_with(away) } else { (1.0, 1.0) };
-                let (dim, bright) = (dim.max(0.0) * share * scale, bright.max(0.0) * share * scale);
+                let scale = share * strength * scale;
+                let (dim, bright) = (dim.max(0.0) * scale, bright.max(0.0) * scale);
                 low += least.max(Rgb::ZERO) * dim + least.min(Rgb::ZERO) * bright;
                 high += most.max(Rgb::ZERO) * bright;
             }
