@@ -64,12 +64,17 @@ pub struct Senders {
 }
 
 impl Senders {
-    /// Those of a set of links. `reflects` tells of which leaves the extension makes directional light.
-    pub(crate) fn new(elements: &Elements, links: &Links, reflects: impl Fn(u32) -> bool) -> Self {
+    /// Those of a set of links, and `others`. `reflects` tells of which leaves the extension makes directional light.
+    pub(crate) fn new(
+        elements: &Elements,
+        links: &Links,
+        others: impl Iterator<Item = u32>,
+        reflects: impl Fn(u32) -> bool,
+    ) -> Self {
         let nodes = &elements.nodes;
         let mut sends = vec![false; nodes.len()];
-        for link in links.all() {
-            sends[link.sender as usize] = nodes[link.sender as usize].active;
+        for sender in links.all().iter().map(|link| link.sender).chain(others) {
+            sends[sender as usize] = nodes[sender as usize].active;
         }
         // Whether the node or any above it sends.
         let mut below = sends.clone();
@@ -194,7 +199,10 @@ impl<L: LightField> Solver<L> {
         self.strengths.resize(count, 1.0);
         self.brightest.resize(count, 0.0);
         let (elements, faint) = (&self.elements, &self.faint);
-        let mut senders = Senders::new(elements, &self.links, |leaf| {
+        // What is pure metal has no diffuse light, and gets no links while it is dark: it is lit now.
+        let waiting = self.unfinished.unlit.iter().map(|pair| pair.sender);
+        let lit = waiting.filter(|&sender| self.exitant.directional[sender as usize] != Rgb::ZERO);
+        let mut senders = Senders::new(elements, &self.links, lit, |leaf| {
             faint[elements.nodes[leaf as usize].material as usize] == Rgb::ZERO
         });
         let mut leaves = senders.leaves(elements);
