@@ -26,7 +26,7 @@ pub(crate) fn assert_sane<L: LightField>(solution: &Solution<L>, what: &str) {
 }
 
 /// Mean irradiance of a surface's front, averaged over the channels; 0 where no light reaches it.
-pub(crate) fn irradiance(solution: &Solution, surface: usize) -> f64 {
+pub(crate) fn irradiance<L: LightField>(solution: &Solution<L>, surface: usize) -> f64 {
     let node = solution.elements.surface_nodes[surface][0] as usize;
     solution.exitant.irradiance.get(node).map_or(0.0, |e| f64::from(e.element_sum() / 3.0))
 }
