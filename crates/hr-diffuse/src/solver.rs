@@ -401,7 +401,8 @@ impl<L: LightField> Solver<L> {
         let account = self.account;
         let mut before = self.begin_shooting(reflects);
         // Light settles with what leaves have reflected of much of it, and once more with what all reflect of all of it.
-        let (mut settled, mut finely) = (false, !reflects || self.shot.is_some());
+        let directional = reflects && self.elements.nodes[0].active;
+        let (mut settled, mut finely) = (false, !directional || self.shot.is_some());
         for iteration in 0..if before.is_some() { MOST_ITERATIONS } else { most } {
             let fraction = pass.fraction(0.6 + 0.3 * (iteration as f32 / (iteration as f32 + 4.0)));
             let progress = self.progress(Phase::Transport, fraction);
