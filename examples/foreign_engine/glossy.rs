@@ -1,6 +1,7 @@
 //! All that the engine had to be given for glossy light. Of each patch it keeps the illumination samples whose reflection
 //! is still to be shot: they are to glossy light what unshot radiosity is to diffuse light.
 
+use crate::ERROR;
 use crate::engine::Patch;
 use glam::Vec3;
 use glossy_ext::hooks::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
@@ -68,14 +69,14 @@ impl Glossy {
     pub(crate) fn take_unshot(&mut self, patches: &[Patch], patch: usize) -> Exitant {
         let samples = &mut self.samples[patch];
         let irradiance = std::mem::take(&mut samples.irradiance);
-        let light = reflect(&self.field, patches, patch, &samples.unshot, irradiance);
+        let light = reflect(&self.field, patches, patch, &samples.unshot, irradiance, false);
         self.field.clear(&mut samples.unshot);
         light
     }
 
     /// All glossy light of a patch, at the end.
     pub(crate) fn leaving(&self, patches: &[Patch], patch: usize) -> Exitant {
-        reflect(&self.field, patches, patch, &self.samples[patch].all, patches[patch].irradiance)
+        reflect(&self.field, patches, patch, &self.samples[patch].all, patches[patch].irradiance, true)
     }
 
     /// What a diffuse patch would have to send so as to be as bright from a direction.
@@ -100,13 +101,13 @@ impl Glossy {
 }
 
 /// The glossy reflection of some of a patch's samples.
-fn reflect(field: &Field, patches: &[Patch], patch: usize, samples: &Incident, irradiance: Vec3) -> Exitant {
-    let paint = patches[patch].paint as u32;
-    if field.active(paint).is_none() {
+fn reflect(field: &Field, patches: &[Patch], at: usize, samples: &Incident, irradiance: Vec3, shown: bool) -> Exitant {
+    let Patch { paint, bend, .. } = patches[at];
+    if field.active(paint as u32).is_none() {
         return Exitant::default();
     }
     // Diffuse light is the engine's own.
-    let arrived =
-        Arrived { irradiance, diffuse: Vec3::ZERO, spread: patches[patch].bend, negligible: 0.0, shown: false };
-    field.reflect(&Leaves(patches), NodeId(patch as u32), &[samples], arrived)
+    let diffuse = Vec3::ZERO;
+    let arrived = Arrived { irradiance, diffuse, spread: bend, negligible: 0.0, error: ERROR, shown };
+    field.reflect(&Leaves(patches), NodeId(at as u32), &[samples], arrived)
 }

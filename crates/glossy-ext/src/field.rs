@@ -37,6 +37,10 @@ const MOST_SCALE: f32 = 2.0;
 const MOST_BALANCE: f32 = 4.0;
 /// Places of a leaf whose normals differ by more than this (radians) from that of its middle see more than the middle does.
 const AROUND: f32 = 0.3;
+/// Samples that are merged since they are weak make up at most so many times the error asked for of the irradiance at a place…
+const WEAK_PER_ERROR: f32 = 3.0;
+/// … and never more than this share.
+const WEAK_SHARE: f32 = 0.3;
 /// Of a leaf's samples, the directions of so many strongest ones are told to the projection as peaks.
 const PEAKS: usize = 12;
 
@@ -199,7 +203,7 @@ impl<B: Basis> GlossyField<B> {
             }
             merge_close(&mut incident, close);
             let focus = Focus::of(&incident, &place.frame);
-            merge_weak(&mut incident, width.max(narrowest));
+            merge_weak(&mut incident, width.max(narrowest), WEAK_SHARE.min(WEAK_PER_ERROR * arrived.error));
             // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
             for sample in &mut incident {
                 sample.widen(if width < WIDE * narrowest { narrowest } else { 0.0 });
@@ -221,7 +225,9 @@ impl<B: Basis> GlossyField<B> {
         }
         // A glossy part may be negative where the diffuse one overestimates; both together are not.
         let (least, negligible) = (-arrived.diffuse, arrived.negligible);
-        Some(Reflection { material, place, incident, focus, narrowest, flat, around, least, negligible })
+        // What goes on to other leaves is spread by how far away they are; only who looks at a highlight sees its edge.
+        let error = if arrived.shown { arrived.error } else { 1.0 };
+        Some(Reflection { material, place, incident, focus, narrowest, flat, around, least, negligible, error })
     }
 
     /// Represents what a leaf reflects in the basis.
@@ -239,6 +245,7 @@ impl<B: Basis> GlossyField<B> {
             peaks: &peaks,
             finest: FINEST * reflection.narrowest,
             negligible: reflection.negligible,
+            error: reflection.error,
         };
         let mut overruled = 0;
         let projected = B::project(&self.settings, &known, |direction| {
@@ -333,6 +340,8 @@ pub struct Reflection<'a> {
     least: Rgb,
     /// What differs by less is not looked at, in the unit of the distribution.
     negligible: f32,
+    /// As in [`Known`].
+    error: f32,
 }
 
 impl Reflection<'_> {

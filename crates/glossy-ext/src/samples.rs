@@ -120,8 +120,6 @@ pub fn arriving<H: Hierarchy>(
     }
 }
 
-/// Weak samples that are merged make up at most this share of the irradiance at a place.
-const WEAK_SHARE: f32 = 0.3;
 /// Weak samples that make a peak of at least this share of the highest one stay as they are: of the lamps along a counter one sees
 /// the far ones, too. That takes 8 % more BRDF evaluations in a soda shop.
 const PEAK_SHARE: f32 = 0.25;
@@ -148,9 +146,10 @@ pub fn merge_close(incident: &mut Vec<Incident>, width: f32) {
     }
 }
 
-/// Merges the weakest samples at a place, so that no more than 36 of them are left. The strong ones stay as they are, and so do
+/// Merges the weakest samples at a place, which make up such a share of the irradiance, so that no more than 36 of them are left. The
+/// strong ones stay as they are, and so do
 /// weak ones that make peaks of what a lobe of this width (radians) reflects: small lamps, far away.
-pub fn merge_weak(incident: &mut Vec<Incident>, width: f32) {
+pub fn merge_weak(incident: &mut Vec<Incident>, width: f32, share: f32) {
     if incident.len() <= (WEAK_CELLS * WEAK_CELLS) as usize {
         return;
     }
@@ -158,7 +157,7 @@ pub fn merge_weak(incident: &mut Vec<Incident>, width: f32) {
     let total: f32 = incident.iter().map(strength).sum();
     let mut rest = 0.0;
     let mut strong = incident.len();
-    while strong > 0 && rest + strength(&incident[strong - 1]) <= WEAK_SHARE * total {
+    while strong > 0 && rest + strength(&incident[strong - 1]) <= share * total {
         strong -= 1;
         rest += strength(&incident[strong]);
     }
@@ -337,7 +336,7 @@ mod tests {
         let mut incident: Vec<Incident> = [overhead, far].into_iter().chain((0..60).map(wall)).collect();
         let irradiance = |of: &[Incident]| of.iter().map(strength).sum::<f32>();
         let before = irradiance(&incident);
-        merge_weak(&mut incident, 0.1);
+        merge_weak(&mut incident, 0.1, 0.3);
         assert!(incident.contains(&overhead) && incident.contains(&far), "both lamps stay: {incident:?}");
         assert!(incident.len() <= 2 + 36, "walls are merged: {} samples", incident.len());
         assert!((irradiance(&incident) / before - 1.0).abs() < 1e-5, "irradiance adds up");

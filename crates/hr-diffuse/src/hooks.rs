@@ -167,6 +167,8 @@ pub struct Arrived {
     /// Differences of the leaf's exitant light by less than this, W/(m² sr), make no difference to what is asked for: 0
     /// where everything counts.
     pub negligible: f32,
+    /// The relative error asked for, 0…1. What is merged or interpolated may be wrong by about as much.
+    pub error: f32,
     /// Whether the leaf is only looked at, with each place's own normal, and sends no light on: then a curved one reflects what its
     /// middle does not see, too.
     pub shown: bool,
@@ -184,6 +186,9 @@ impl Arrived {
         }
         if !(0.0..=PI).contains(&self.spread) {
             return Some("the spread is not within 0…π");
+        }
+        if !(0.0..=1.0).contains(&self.error) {
+            return Some("the error is not within 0…1");
         }
         (!(0.0..).contains(&self.negligible)).then_some("what is negligible is negative or no number")
     }

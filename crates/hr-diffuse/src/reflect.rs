@@ -342,7 +342,7 @@ impl<L: LightField> Solver<L> {
         shown: bool,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Vec<L::Exitant> {
-        let elements = &self.elements;
+        let (elements, error) = (&self.elements, self.settings.error);
         let reflect = |&Standing { leaf, spread, negligible }: &Standing| {
             let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
             let mut node = leaf;
@@ -358,7 +358,7 @@ impl<L: LightField> Solver<L> {
                 elements,
                 NodeId(leaf),
                 &path,
-                Arrived { irradiance, diffuse, spread, negligible, shown },
+                Arrived { irradiance, diffuse, spread, negligible, error, shown },
             )
         };
         let mut exitant: Vec<L::Exitant> = Vec::with_capacity(leaves.len());

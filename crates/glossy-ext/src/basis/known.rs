@@ -54,12 +54,15 @@ pub struct Known<'a> {
     pub finest: f32,
     /// What differs by no more than this, in the unit of the function, is not refined. Bases that do not adapt take no notice.
     pub negligible: f32,
+    /// Interpolation is to be as exact as this, relative to the function, where the settings are less strict. Bases that do not
+    /// adapt take no notice.
+    pub error: f32,
 }
 
 impl Known<'_> {
     /// Nothing: the whole sphere, no offset, no peaks.
     pub const NOTHING: Known<'static> =
-        Known { support: None, offset: Rgb::ZERO, peaks: &[], finest: 0.0, negligible: 0.0 };
+        Known { support: None, offset: Rgb::ZERO, peaks: &[], finest: 0.0, negligible: 0.0, error: 1.0 };
 }
 
 /// A projection and what it took.

@@ -47,7 +47,8 @@ fn lit_floor() -> (GlossyField, Floor, SampleSet, Rgb) {
 #[test]
 fn negligible_detail_is_left_out() {
     let (field, floor, incident, irradiance) = lit_floor();
-    let arrived = |negligible| Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible, shown: false };
+    let arrived =
+        |negligible| Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible, error: 0.1, shown: false };
     let project = |negligible| {
         let before = field.counters().brdf_evaluations();
         let reflection = field.reflection(&floor, FLOOR, &[&incident], arrived(negligible)).expect("it is lit");
@@ -77,6 +78,30 @@ fn negligible_detail_is_left_out() {
     assert!((some / right - 1.0).abs() < 0.02, "{some} W/m² of {right}");
 }
 
+/// What is looked at is as exact as asked for; what goes on to others need not be.
+#[test]
+fn what_is_shown_is_as_exact_as_asked() {
+    let (field, floor, incident, irradiance) = lit_floor();
+    // The sum over directions of how far the projection is off, in the light's own.
+    let off = |error, shown| {
+        let arrived = Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible: 0.0, error, shown };
+        let reflection = field.reflection(&floor, FLOOR, &[&incident], arrived).expect("it is lit");
+        let made = field.project(&reflection);
+        let (mut difference, mut all) = (0.0, 0.0);
+        for k in 0..4000_u16 {
+            let z = (f32::from(k) + 0.5) / 4000.0;
+            let toward = (Vec2::from_angle(2.399_963_2 * f32::from(k)) * (1.0 - z * z).sqrt()).extend(z);
+            let right = reflection.toward(toward).x;
+            difference += (made.eval(toward).x - right).abs();
+            all += right;
+        }
+        difference / all
+    };
+    assert_eq!(off(0.01, false), off(0.1, false), "what goes on to others");
+    assert!(off(0.1, true) < 0.05, "off by {}", off(0.1, true));
+    assert!(off(0.02, true) < 0.01, "off by {}, where 0.02 is asked for", off(0.02, true));
+}
+
 /// However coarse a distribution is, it has the power that its samples make: here a smooth dielectric, which reflects what
 /// grazes it up to twenty times as strongly as what comes from above.
 #[test]
@@ -94,7 +119,7 @@ fn coarse_distributions_keep_their_power() {
         irradiance += sample;
     }
     let diffuse = irradiance * (0.4 * std::f32::consts::FRAC_1_PI);
-    let arrived = Arrived { irradiance, diffuse, spread: 0.0, negligible: 0.1, shown: false };
+    let arrived = Arrived { irradiance, diffuse, spread: 0.0, negligible: 0.1, error: 0.1, shown: false };
     let reflection = field.reflection(&floor, FLOOR, &[&incident], arrived).expect("it is lit");
     let mut exact = Rgb::ZERO;
     const STEPS: u16 = 400;
@@ -140,7 +165,7 @@ fn highlights_move_over_a_leaf_with_the_eye() {
     let (direction, irradiance) = (lamp.normalize(), Rgb::ONE);
     let mut incident = SampleSet::new();
     field.receive(&mut incident, &Transfer { sender: NodeId(1), direction, irradiance, oriented: true });
-    let arrived = Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible: 0.0, shown: false };
+    let arrived = Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible: 0.0, error: 0.1, shown: false };
     let exitant = field.reflect(&floor, FLOOR, &[&incident], arrived);
     let far = Focus::default();
     // Where in a square of 1 the leaf shines most toward an eye.

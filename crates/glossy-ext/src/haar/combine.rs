@@ -144,7 +144,8 @@ fn coarsen(fine: &Mesh, settings: &Refinement, offset: Rgb) -> Mesh {
         let tri = mesh.tris[index];
         let (there, what) = (fine.tris[same[index] as usize], all[same[index] as usize]);
         let wanted = tri.level < settings.max_level()
-            && (tri.level < settings.min_level() || settings.is_rough(&what.variation, what.center + offset, largest));
+            && (tri.level < settings.min_level()
+                || settings.is_rough(&what.variation, what.center + offset, largest, 1.0));
         if !tri.is_divided() && there.is_divided() && wanted {
             mesh.divide(index as u32, &mut |m: &Midpoint| {
                 let mids = fine.tris[same[m.tri as usize] as usize].mids;

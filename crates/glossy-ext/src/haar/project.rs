@@ -72,12 +72,13 @@ impl Refinement {
         Self { min_level: 1, max_level: 5, refiner: Refiner::Relative(0.5), negligible: 0.0, preserve_energy: false };
 
     /// Whether a triangle must be subdivided. `center` includes the offset; `largest` is the largest component met
-    /// so far.
-    pub(super) fn is_rough(&self, variation: &Variation, center: Rgb, largest: f32) -> bool {
+    /// so far, `error` how exact interpolation is to be at least.
+    pub(super) fn is_rough(&self, variation: &Variation, center: Rgb, largest: f32, error: f32) -> bool {
         let size = center.abs().max_element().max(self.negligible * largest);
         let spread = self.spread(variation);
         match self.refiner {
-            Refiner::Relative(epsilon) | Refiner::Interpolation(epsilon) => spread > epsilon * size,
+            Refiner::Relative(epsilon) => spread > epsilon * size,
+            Refiner::Interpolation(epsilon) => spread > epsilon.min(error) * size,
             Refiner::Absolute(threshold) => spread > threshold,
         }
     }
@@ -164,7 +165,7 @@ impl Haar {
                     let center = center_of(&mut findings[index], &mut sampler, &triangle);
                     let variation = variation(&sampler, &mesh, &tri, &triangle, center);
                     let middle = center + known.offset;
-                    let is_rough = settings.is_rough(&variation, middle, sampler.largest);
+                    let is_rough = settings.is_rough(&variation, middle, sampler.largest, known.error);
                     let counts = is_rough && settings.spread(&variation) > known.negligible;
                     spared += usize::from(is_rough && !counts);
                     counts

@@ -43,7 +43,7 @@ pub(super) fn glossy_leaves(solution: &Solution<GlossyField>, step: usize) -> Ve
             Leaf {
                 node: NodeId(leaf),
                 path,
-                arrived: Arrived { irradiance, diffuse, spread: 0.0, negligible: 0.0, shown: false },
+                arrived: Arrived { irradiance, diffuse, spread: 0.0, negligible: 0.0, error: 0.1, shown: false },
             }
         })
         .collect()

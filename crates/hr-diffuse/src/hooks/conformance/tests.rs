@@ -67,6 +67,7 @@ impl Host {
                 diffuse: Rgb::ZERO,
                 spread: 0.0,
                 negligible: 0.0,
+                error: 0.1,
                 shown: false,
             },
             path: vec![0, 1],
@@ -124,7 +125,7 @@ fn a_host_that_conforms_passes() {
 #[test]
 fn every_fault_is_found() {
     type Wrong = (fn(&mut Host), &'static str);
-    let cases: [Wrong; 19] = [
+    let cases: [Wrong; 20] = [
         (|h| h.direction = 2.0 * Vec3::Z, "not a unit vector"),
         (|h| h.irradiance.x = f32::NAN, "negative or not finite"),
         (|h| h.direction = -Vec3::Z, "from direction"),
@@ -132,6 +133,7 @@ fn every_fault_is_found() {
         (|h| h.normals[1].cos_angle = 0.5, "oriented: true"),
         (|h| h.arrived.irradiance.y = -1.0, "arrived at leaf 1"),
         (|h| h.arrived.spread = f32::NAN, "spread"),
+        (|h| h.arrived.error = 2.0, "the error is not within"),
         (|h| h.materials[1] = Some(1), "does nothing with its material"),
         (|h| h.path = vec![2, 0, 1], "light of 3 nodes"),
         (|h| h.path = Vec::new(), "light of 0 nodes"),
