@@ -46,6 +46,10 @@ const CONVERGED_SHARE: f32 = 0.02;
 const MOST_ITERATIONS: u32 = 400;
 /// So many where light need only be there roughly.
 const FEW_ITERATIONS: u32 = 3;
+/// Links follow light over so many reflections at most from one pure metal to the next, in one pass, …
+const MOST_FOLLOWED: usize = 4;
+/// … where more than this times the pass's tolerance of all light waits.
+const FOLLOWED_SHARE: f32 = 0.1;
 /// So many rays for each place are worth knowing how much reflected light links should bring.
 const CALIBRATE_RAYS: usize = 64;
 /// This share of the rays shot so far is worth knowing what the solution is off by, …
@@ -292,6 +296,7 @@ impl<L: LightField> Solver<L> {
             let pass = if late { last } else { pass };
             self.prepare_watched(pass, &mut stopped, watch);
             self.settle(pass, &mut stopped, watch);
+            self.follow(pass, &mut stopped, watch);
             if pass.closely && !stopped {
                 self.calibrate(pass, &mut stopped, watch);
             }
@@ -385,6 +390,36 @@ impl<L: LightField> Solver<L> {
         if pass.closely && !*stopped {
             self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, true), stopped, watch);
         }
+    }
+
+    /// Pure metal is dark until light has come to it, and gets no links before. That light goes on to other metal, so that where much
+    /// waits links follow it from one to the next within a pass: those that come may be much finer.
+    fn follow(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        for _ in 0..MOST_FOLLOWED {
+            let goes_on = pass.reflects && !*stopped && !self.account.is_over() && self.stats.spent.is_none();
+            if !goes_on || self.waiting() < FOLLOWED_SHARE * pass.tolerance {
+                break;
+            }
+            self.refine(pass, stopped, watch);
+            if !*stopped {
+                self.prepare_watched(pass, stopped, watch);
+                self.settle(pass, stopped, watch);
+            }
+        }
+    }
+
+    /// Share of all light that senders reflect as directional light while some pair waits for it without a link.
+    fn waiting(&self) -> f32 {
+        let power = |light: &[Rgb], node: u32| {
+            (light[node as usize].element_sum() * self.elements.nodes[node as usize].area).max(0.0)
+        };
+        let Exitant { radiosity, directional, .. } = &self.exitant;
+        let mut senders: Vec<u32> = self.unfinished.unlit.iter().map(|pair| pair.sender).collect();
+        senders.sort_unstable();
+        senders.dedup();
+        let waits: f32 = senders.into_iter().map(|sender| power(directional, sender)).sum();
+        let all = power(radiosity, 0) + power(directional, 0);
+        if all > 0.0 { waits / all } else { 0.0 }
     }
 
     /// Iterates, so many times at most, until what is to come is below a share of the error, with or without the extension's light.
