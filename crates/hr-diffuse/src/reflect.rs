@@ -24,6 +24,9 @@ const REPRESENTATIVES: usize = 16;
 const RESHAPED: f32 = 0.3;
 /// The same, once light has settled, as a share of the error asked for.
 const SETTLED_SHARE: f32 = 1.0;
+/// Until then what it sends follows what arrives in steps of this share of the error asked for: that by which light may still
+/// change when it counts as settled.
+const STRENGTH_STEP: f32 = 0.02;
 
 /// What changes the light that links carry by less than this share of what they may be wrong by is negligible in the light of
 /// the leaves that stand for their senders. These are up to sixteen, and each errs on its own.
@@ -239,10 +242,10 @@ impl<L: LightField> Solver<L> {
     fn strength(&mut self, leaf: u32) -> f32 {
         let [now, last] = [&self.exitant.irradiance, &self.last_reflected].map(|of| of[leaf as usize].element_sum());
         let (strength, before) = (now / last, &mut self.strengths[leaf as usize]);
-        // Were it to follow each change, of lobes that mirror each other less would die out than their surfaces take up.
+        // Light rises until it has settled: steps of all of the error would leave what is sent behind what arrives, bounce by bounce.
         if last > 0.0
             && strength.is_finite()
-            && (strength - *before).abs() > SETTLED_SHARE * self.settings.error * *before
+            && (strength - *before).abs() > STRENGTH_STEP * self.settings.error * *before
         {
             *before = strength;
         }
