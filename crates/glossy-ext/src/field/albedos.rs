@@ -5,6 +5,7 @@
 //! dielectric in a lit room by 60 %. One link does not tell; all of them together do. Power is known without a projection: it is
 //! that of the samples, each times the albedo of its direction.
 
+use super::possible;
 use crate::Rgb;
 use crate::reflector::{Incident, Reflector};
 use glam::Vec3;
@@ -14,6 +15,8 @@ use std::f32::consts::TAU;
 const NODES: usize = 17;
 /// Directions that are averaged for each of them where the reflector has a grain.
 const TURNS: usize = 4;
+/// More than this times what a surface can reflect is no matter of quadrature.
+const MUCH: f32 = 1.05;
 /// The lowest direction that is integrated, as a cosine.
 const LOWEST: f32 = 1e-3;
 
@@ -22,7 +25,8 @@ const LOWEST: f32 = 1e-3;
 pub(super) struct Albedos([Rgb; NODES]);
 
 impl Albedos {
-    /// Those of a reflector, without a mirror that is part of it: some 10,000 evaluations. What is no number counts as 0.
+    /// Those of a reflector, without a mirror that is part of it: some 10,000 evaluations. What is no number counts as 0. Where their
+    /// mean is much more than a surface can reflect, they are scaled down to it: else light would grow without end.
     pub(super) fn new(reflector: &dyn Reflector) -> Self {
         let turns = if reflector.grain().is_some() { TURNS } else { 1 };
         let toward = |cos: f32| {
@@ -31,10 +35,14 @@ impl Albedos {
             let mean = (0..turns).map(|k| reflector.directional_albedo(turned(k))).sum::<Rgb>() / turns as f32;
             if mean.is_finite() { mean } else { Rgb::ZERO }
         };
-        Self(std::array::from_fn(|k| {
-            let x = k as f32 / (NODES - 1) as f32;
-            toward((x * x).max(LOWEST))
-        }))
+        let node = |k: usize| k as f32 / (NODES - 1) as f32;
+        let all: [Rgb; NODES] = std::array::from_fn(|k| toward((node(k) * node(k)).max(LOWEST)));
+        // ∫ a(μ) 2μ dμ, where μ = x².
+        let weight = |k: usize| if k == NODES - 1 { 0.5 } else { 1.0 } * 4.0 * node(k).powi(3) / (NODES - 1) as f32;
+        let mean: Rgb = all.iter().enumerate().map(|(k, &albedo)| albedo * weight(k)).sum();
+        let most = possible(Rgb::ONE, reflector.diffuse() + reflector.mirror());
+        let is_possible = mean.cmple(MUCH * most);
+        Self(all.map(|albedo| albedo * Rgb::select(is_possible, Rgb::ONE, most / mean)))
     }
 
     /// Interpolated at a cosine.
