@@ -1,4 +1,6 @@
-//! The whole pipeline, from surfaces to the finished solution: analytic answers, invariances, determinism.
+//! The whole pipeline, from surfaces to the finished solution: analytic answers, invariances, determinism, stability.
+//!
+//! One program for all of it: the solver is compiled anew into each.
 
 mod determinism;
 mod diffuse;
@@ -9,3 +11,4 @@ mod invariance;
 mod moved;
 mod scenes;
 mod shooting;
+mod stability;

@@ -1,7 +1,7 @@
 //! Who breaks gets what there is, soon: little is done after it, and the solution says so.
 
-use crate::answers::assert_sane;
 use crate::scenes::Room;
+use crate::stability::answers::assert_sane;
 use glossy_ext::GlossyField;
 use glossy_ext::haar::Refinement;
 use hr_diffuse::{Phase, Progress, Settings, Solution, Solver};

@@ -1,8 +1,8 @@
 //! Hard scenes, at any scale, anywhere, any way up: the answers that are known.
 
-use crate::cases::{self, Case};
-use crate::placement::{self, Placement};
 use crate::scenes::solve;
+use crate::stability::cases::{self, Case};
+use crate::stability::placement::{self, Placement};
 use hr_diffuse::{LightField, SceneInput, Solution};
 
 /// Asked for in all cases, and the most that known values are off where the case says no less.

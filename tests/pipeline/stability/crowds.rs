@@ -1,8 +1,8 @@
 //! Very many surfaces.
 
-use crate::answers::{assert_sane, irradiance};
-use crate::cases::{PARALLEL, ceiling, glowing};
 use crate::scenes::{quad, solve};
+use crate::stability::answers::{assert_sane, irradiance};
+use crate::stability::cases::{PARALLEL, ceiling, glowing};
 use glam::DVec3;
 use hr_diffuse::{DiffuseMaterial, Rgb, SceneInput, Shape, Surface};
 

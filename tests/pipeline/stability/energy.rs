@@ -1,8 +1,8 @@
 //! Light that is reflected nearly without loss, and without any.
 
-use crate::answers::{assert_sane, irradiance};
-use crate::cases::{ceiling, glowing};
 use crate::scenes::{quad, solve, walls};
+use crate::stability::answers::{assert_sane, irradiance};
+use crate::stability::cases::{ceiling, glowing};
 use glam::DVec3;
 use glossy_ext::haar::Refinement;
 use glossy_ext::{GlossyField, Lambert, MetallicRoughness, Phong, Reflector};

@@ -1,8 +1,8 @@
 //! Reflectors that do what no surface can: the solution stays finite and bounded, and tells.
 
-use crate::answers::assert_sane;
-use crate::cases::glowing;
 use crate::scenes::{solve, walls};
+use crate::stability::answers::assert_sane;
+use crate::stability::cases::glowing;
 use glam::{DVec3, Vec3};
 use glossy_ext::haar::Refinement;
 use glossy_ext::{GlossyField, Lambert, Lobe, MetallicRoughness, Phong, Reflector};

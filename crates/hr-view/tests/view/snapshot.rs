@@ -1,7 +1,6 @@
 //! The shader against the formula that it stands for.
 
-mod room;
-
+use crate::room::Room;
 use glam::{DVec3, Mat3, Vec2, Vec3};
 use glossy_ext::Rgb;
 use hr_scene::{Camera, Primaries};
@@ -139,7 +138,7 @@ fn back_faces_are_not_seen() {
 
 #[test]
 fn the_room_far_from_zero_is_where_it_should_be() {
-    let room = room::Room::new(16);
+    let room = Room::new(16);
     let (_, camera) = &room.cameras()[0];
     let Some(picture) = draw(&room, camera, None) else {
         return;
@@ -159,7 +158,7 @@ fn the_room_far_from_zero_is_where_it_should_be() {
 
 #[test]
 fn the_highlight_follows_the_eye() {
-    let room = room::Room::new(64);
+    let room = Room::new(64);
     let (_, camera) = &room.cameras()[2];
     let Some(picture) = draw(&room, camera, None) else { return };
     let highlight = pixel(&picture, 320, 200)[0];

@@ -10,7 +10,4 @@ mod input;
 mod placement;
 mod random;
 mod reflectors;
-#[path = "../pipeline/scenes.rs"]
-#[allow(dead_code, reason = "the pipeline's tests use more of it")]
-mod scenes;
 mod stopping;

@@ -1,6 +1,6 @@
 //! Random scenes and settings, made to hit the hard cases: shared corners, common planes, zero and huge numbers.
 
-use crate::answers::assert_sane;
+use crate::stability::answers::assert_sane;
 use glam::{DVec3, Vec3};
 use hr_diffuse::sampling::{hash, unit};
 use hr_diffuse::{

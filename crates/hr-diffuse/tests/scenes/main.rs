@@ -1,0 +1,16 @@
+//! Scenes whose light is known, and rooms that are lit, edited, and gone on with.
+//!
+//! One program for all of them: the solver is compiled anew into each.
+
+mod analytic;
+mod balance;
+mod budget;
+mod contacts;
+mod copies;
+mod covered;
+mod fixtures;
+mod rearrange;
+mod relight;
+mod resume;
+mod shadows;
+mod shooting;
