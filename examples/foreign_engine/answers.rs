@@ -6,6 +6,7 @@ use glossy_ext::GlossyField;
 use glossy_ext::haar::Refinement;
 use hr_diffuse::{LightField, Settings, Solution, SolveError, Solver};
 use hr_scene::Scene;
+use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -47,7 +48,9 @@ impl Answer {
             power[block] += patch.irradiance.y * patch.area;
             area[block] += patch.area;
         }
-        let floor: Vec<_> = with(FLOOR).map(|patch| engine.glossy.leaving(&engine.patches, patch)).collect();
+        let patches: Vec<_> = with(FLOOR).collect();
+        let floor: Vec<_> =
+            patches.into_par_iter().map(|patch| engine.glossy.leaving(&engine.patches, patch)).collect();
         let toward = |eye: Vec3| {
             mean(with(FLOOR).zip(&floor).map(|(patch, light)| {
                 let patch = &engine.patches[patch];

@@ -8,7 +8,7 @@ use hr_scene::{Camera, Scene};
 use hr_view::Mode;
 use hr_view::raycast::RayCaster;
 use std::ops::{ControlFlow, Range};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 /// The error that is asked for.
 const ERROR: f32 = 0.1;
@@ -73,8 +73,16 @@ fn pictures(scene: &Scene, a: &Solution<GlossyField>, b: &Solution<GlossyField>,
     apart / b.iter().map(|b| b.element_sum()).sum::<f32>()
 }
 
-/// Moves what is in a solved scene once or several times, and compares it to a fresh solve.
-fn rearranged(first: &Arc<Scene>, moves: &[Arc<Scene>]) {
+/// The scene before anything has moved, and its solution.
+static BEFORE: LazyLock<(Arc<Scene>, Solution<GlossyField>)> = LazyLock::new(|| {
+    let scene = Arc::new(Scene::load("glossy-sphere").expect("built in"));
+    let solution = finished(solver(&scene));
+    (scene, solution)
+});
+
+/// Moves what is in the solved scene once or several times, and compares it to a fresh solve.
+fn rearranged(moves: &[Arc<Scene>]) {
+    let (first, before) = &*BEFORE;
     let mut solver = solver(first);
     for scene in moves {
         solver.rearrange(&scene.input(), &mut |_| ControlFlow::Continue(())).expect("places of the same surfaces");
@@ -82,36 +90,28 @@ fn rearranged(first: &Arc<Scene>, moves: &[Arc<Scene>]) {
     assert!(solver.stats().kept_links > 0, "some of it stays");
     let last = moves.last().expect("a move");
     let (there, fresh) = (finished(solver), finished(self::solver(last)));
-    let before = finished(self::solver(first));
     let off = irradiances(&there, &fresh);
     assert!(off < ERROR, "irradiance is off by {off}");
     for mode in [Mode::Samples, Mode::Distributions] {
-        let (edit, off) = (pictures(last, &before, &fresh, mode), pictures(last, &there, &fresh, mode));
+        let (edit, off) = (pictures(last, before, &fresh, mode), pictures(last, &there, &fresh, mode));
         assert!(edit > 2.0 * ERROR, "{mode:?}: the edit is one: {edit}");
         assert!(off < ERROR, "{mode:?}: pictures are off by {off}");
     }
 }
 
-fn glossy_sphere() -> Arc<Scene> {
-    Arc::new(Scene::load("glossy-sphere").expect("built in"))
-}
-
 #[test]
 fn a_moved_mirror_reflects_what_it_sees_there() {
-    let scene = glossy_sphere();
-    rearranged(&scene, &[shifted(&scene, SPHERE..SPHERE + 1, DVec3::new(-0.6, 0.5, 0.3))]);
+    rearranged(&[shifted(&BEFORE.0, SPHERE..SPHERE + 1, DVec3::new(-0.6, 0.5, 0.3))]);
 }
 
 #[test]
 fn highlights_follow_a_moved_lamp() {
-    let scene = glossy_sphere();
-    rearranged(&scene, &[shifted(&scene, LAMP..LAMP + 1, DVec3::new(-1.5, 0.6, -0.3))]);
+    rearranged(&[shifted(&BEFORE.0, LAMP..LAMP + 1, DVec3::new(-1.5, 0.6, -0.3))]);
 }
 
 #[test]
 fn moves_one_after_the_other_leave_nothing_behind() {
-    let scene = glossy_sphere();
-    let aside = shifted(&scene, SPHERE..SPHERE + 1, DVec3::new(0.9, 0.9, 0.0));
+    let aside = shifted(&BEFORE.0, SPHERE..SPHERE + 1, DVec3::new(0.9, 0.9, 0.0));
     let both = shifted(&aside, LAMP..LAMP + 1, DVec3::new(-1.0, 0.2, 0.0));
-    rearranged(&scene, &[aside, both]);
+    rearranged(&[aside, both]);
 }
