@@ -228,36 +228,31 @@ fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Plac
     let (direction, extent) = hierarchy.direction_to(sender, place.at);
     let cosine = direction.dot(place.normal());
     // A sender with extent may be partly above the horizon though its middle is not; its light is then weak.
-    let local = place.local(direction);
-    let oriented = sample.is_oriented();
-    let nearness = |at: Vec3| {
-        if hierarchy.is_distant(sender) {
-            1.0
-        } else {
-            let spread = hierarchy.radius(sender);
-            (hierarchy.center(sender).distance_squared(at) + spread * spread).recip()
-        }
-    };
-    let renewal = if from.at == place.at { 1.0 } else { nearness(place.at) / nearness(from.at) };
-    let scale = if oriented {
+    if cosine <= 0.0 && (extent <= 0.0 || !sample.is_oriented()) {
+        return None;
+    }
+    let is_distant = hierarchy.is_distant(sender);
+    let (center, radius) = (hierarchy.center(sender), hierarchy.radius(sender));
+    let distance2 = |at: Vec3| center.distance_squared(at) + radius * radius;
+    let renewal = if is_distant || from.at == place.at { 1.0 } else { distance2(from.at) / distance2(place.at) };
+    let scale = if sample.is_oriented() {
         // The cosine is in the irradiance already; grazing senders keep what the link's form factor found.
-        let before = hierarchy.direction_to(sender, from.at).0.dot(from.normal());
+        let before = if is_distant { direction } else { (center - from.at).normalize_or_zero() }.dot(from.normal());
         let turned = if before > 0.1 && cosine > 0.0 { cosine / before } else { 1.0 };
         (renewal * turned).clamp(MOST_RENEWAL.recip(), MOST_RENEWAL)
     } else {
         renewal.clamp(MOST_RENEWAL.recip(), MOST_RENEWAL) * cosine
     };
-    (scale > 0.0 && (cosine > 0.0 || extent > 0.0)).then(|| Incident {
-        direction: local,
+    Some(Incident {
+        direction: place.local(direction),
         extent,
         irradiance: sample.irradiance() * scale,
         contour: if extent > 0.0 { contour(hierarchy, sender, place) } else { Contour::NONE },
-        nearness: if hierarchy.is_distant(sender) {
+        // Within the ball that holds it nobody knows where its light comes from.
+        nearness: if is_distant {
             0.0
         } else {
-            // Within the ball that holds it nobody knows where its light comes from.
-            let distance = hierarchy.center(sender).distance(place.at).max(hierarchy.radius(sender));
-            distance.max(f32::MIN_POSITIVE).recip()
+            center.distance(place.at).max(radius).max(f32::MIN_POSITIVE).recip()
         },
     })
 }

@@ -42,6 +42,10 @@ const GLOWING: f32 = 4.0;
 const MOST_GLOWING: usize = 1024;
 /// The darkest leaf of a part that glows has at least this share of the light of the brightest.
 const EVEN: f32 = 0.3;
+/// Rays of a pixel that meet a leaf at places which are no further apart than this share of its radius, with normals that differ by no
+/// more than this share of the lobe's width, see the same glossy light.
+const SAME_PLACE: f32 = 0.25;
+const SAME_NORMAL: f32 = 0.06;
 /// Rays start this far from their surface (unit space): what rounding needs.
 const START: f32 = 1e-6;
 
@@ -70,6 +74,25 @@ struct Met {
     /// Unit direction back along the ray.
     away: Vec3,
     reflector: Arc<dyn Reflector>,
+    /// Whether no texture changes what it reflects from place to place.
+    is_plain: bool,
+}
+
+/// What the rays of a pixel have in common.
+#[derive(Default)]
+struct Shared {
+    /// Saves allocations.
+    incident: Vec<Incident>,
+    /// Glossy light that was found at leaves.
+    shaded: Vec<Shaded>,
+}
+
+/// Glossy light of a leaf toward the pixel, of samples that arrive.
+struct Shaded {
+    leaf: NodeId,
+    at: Vec3,
+    normal: Vec3,
+    light: Rgb,
 }
 
 /// Rounds of rays that a pixel should have more than all have.
@@ -137,9 +160,9 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         };
         let rows = image.pixels.par_chunks_mut(width).zip(wanted.par_chunks_mut(width));
         rows.enumerate().for_each(|(y, (row, wanted))| {
-            let mut scratch = Vec::new();
+            let mut shared = Shared::default();
             for (x, (mean, wanted)) in row.iter_mut().zip(wanted).enumerate() {
-                let pixel = self.pixel(camera, x, y, 0, &mut scratch);
+                let pixel = self.pixel(camera, x, y, 0, &mut shared);
                 (*mean, *wanted) = (pixel.radiance(), Wanted::by(&pixel));
             }
             tell();
@@ -147,7 +170,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let rows = if printed { height } else { 0 };
         let more = (0..rows).into_par_iter().flat_map_iter(|y| {
             let (wanted, tell) = (&wanted, &tell);
-            let mut scratch = Vec::new();
+            let mut shared = Shared::default();
             let row = move |x: usize| {
                 let around = || {
                     (y.saturating_sub(1)..height.min(y + 2))
@@ -158,7 +181,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
                 if x + 1 == width {
                     tell();
                 }
-                (rounds > 0).then(|| (y * width + x, self.pixel(camera, x, y, u32::from(rounds), &mut scratch)))
+                (rounds > 0).then(|| (y * width + x, self.pixel(camera, x, y, u32::from(rounds), &mut shared)))
             };
             (0..width).filter_map(row)
         });
@@ -167,10 +190,11 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     }
 
     /// What is seen in a pixel with some rounds of rays more than all have.
-    fn pixel(&self, camera: &Camera, x: usize, y: usize, rounds: u32, scratch: &mut Vec<Incident>) -> Pixel {
+    fn pixel(&self, camera: &Camera, x: usize, y: usize, rounds: u32, shared: &mut Shared) -> Pixel {
         let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
         let (rays, seed) = (self.grid * self.grid, hash(x as u32, y as u32 ^ 0x6b43));
         let mut pixel = Pixel::default();
+        shared.shaded.clear();
         for i in 0..rays * (1 + rounds) {
             let sampler = Sampler::new(seed, i);
             let within = if i < rays {
@@ -181,7 +205,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             };
             let (px, py) = (x as f64 + f64::from(within.x), y as f64 + f64::from(within.y));
             let direction = camera.direction(px, py).as_vec3();
-            let (surface, light) = self.seen(eye, direction, u32::MAX, 0, &sampler, scratch);
+            let (surface, light) = self.seen(eye, direction, u32::MAX, 0, &sampler, shared);
             pixel.add(surface, light);
         }
         pixel
@@ -195,14 +219,14 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         own: u32,
         bounce: u32,
         sampler: &Sampler,
-        scratch: &mut Vec<Incident>,
+        shared: &mut Shared,
     ) -> (Option<u32>, Rgb) {
         let visibility = &self.solution.scene.visibility;
         let hit = visibility.closest_except(origin, direction, START, f32::MAX, own);
         let Some(hit) = hit else { return (None, Rgb::ZERO) };
         let emitted = if hit.front { self.material(&hit).exitance * FRAC_1_PI } else { Rgb::ZERO };
         let leaf = self.solution.leaf(&hit);
-        let reflected = leaf.map(|leaf| self.leaving(hit, leaf, direction, bounce, sampler, scratch));
+        let reflected = leaf.map(|leaf| self.leaving(hit, leaf, direction, bounce, sampler, shared));
         (Some(hit.surface), emitted + reflected.unwrap_or(Rgb::ZERO))
     }
 
@@ -218,12 +242,13 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         direction: Vec3,
         bounce: u32,
         sampler: &Sampler,
-        scratch: &mut Vec<Incident>,
+        shared: &mut Shared,
     ) -> Rgb {
         let material = self.material(&hit);
         let element = &self.solution.elements.nodes[leaf.index()];
         let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
         let base_color = self.scene.base_color(hit.surface, hit.uv.x, hit.uv.y);
+        let is_plain = base_color.is_none();
         let reflector = base_color
             .and_then(|color| material.reflector.with_base_color(color))
             .unwrap_or_else(|| Arc::clone(&material.reflector));
@@ -237,17 +262,17 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         // A shading normal that does not see the eye would hide the surface: bend it until it just does.
         let facing = shading.dot(away);
         let normal = if facing > 0.02 { shading } else { (shading + away * (0.02 - facing)).normalize() };
-        let met = Met { hit, leaf, normal, away, reflector };
+        let met = Met { hit, leaf, normal, away, reflector, is_plain };
         let faint = self.solution.faint[element.material as usize];
         let mirrors = met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES;
         let glossy = match self.mode {
             Mode::Distributions => self.interpolated(&met),
-            Mode::Samples if bounce == 0 || mirrors => self.reflected(&met, bounce, sampler, scratch),
+            Mode::Samples if bounce == 0 || mirrors => self.reflected(&met, bounce, sampler, shared),
             Mode::Samples | Mode::Gather if faint != Rgb::ZERO => faint * irradiance * FRAC_1_PI,
             // Of leaves whose light no link asked for there is no distribution.
             Mode::Samples | Mode::Gather if self.solution.reflected[leaf.index()].is_empty() => {
                 let place = Place::along(met.hit.point, met.normal, met.reflector.grain());
-                glossy::reflected(self.solution, &*met.reflector, leaf, &place, away, NARROWEST, scratch)
+                glossy::reflected(self.solution, &*met.reflector, leaf, &place, away, NARROWEST, &mut shared.incident)
             }
             Mode::Samples | Mode::Gather => self.interpolated(&met),
         };
@@ -261,39 +286,57 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     }
 
     /// Glossy radiance from the samples that arrive at the point, or along rays where the lobe is narrow.
-    fn reflected(&self, met: &Met, bounce: u32, sampler: &Sampler, scratch: &mut Vec<Incident>) -> Rgb {
+    fn reflected(&self, met: &Met, bounce: u32, sampler: &Sampler, shared: &mut Shared) -> Rgb {
         let place = Place::along(met.hit.point, met.normal, met.reflector.grain());
         let outgoing = place.local(met.away);
         let mirror = met.reflector.mirror();
         let mut light = Rgb::ZERO;
         if mirror != Rgb::ZERO {
             let direction = met.normal * (2.0 * met.normal.dot(met.away)) - met.away;
-            light += mirror * self.along(met, direction, bounce, &sampler.apart(0), scratch);
+            light += mirror * self.along(met, direction, bounce, &sampler.apart(0), shared);
         }
         if met.reflector.glossy_albedo() == Rgb::ZERO {
             return light;
         }
-        if met.reflector.lobe(outgoing).width < FOLLOWED {
+        let lobe = met.reflector.lobe(outgoing);
+        if lobe.width < FOLLOWED {
             let turns: [Vec2; LOBE_RAYS] = std::array::from_fn(|k| sampler.split(LOBE_RAYS as u32, k as u32).pair(1));
             let pairs = [2, 3].map(|dimension| sampler.pair(dimension));
             let mut number = 0;
             let mut beyond = |hit: &Hit, direction| {
                 number += 1;
                 let Some(leaf) = self.solution.leaf(hit) else { return Rgb::ZERO };
-                self.leaving(*hit, leaf, direction, bounce + 1, &sampler.apart(number), scratch)
+                self.leaving(*hit, leaf, direction, bounce + 1, &sampler.apart(number), shared)
             };
             return light + self.tracer.glossy(&met.hit, -met.away, pairs, &turns, &mut beyond);
         }
-        light + glossy::reflected(self.solution, &*met.reflector, met.leaf, &place, met.away, 0.0, scratch)
+        let (at, normal, leaf) = (place.at, met.normal, met.leaf);
+        let near = SAME_PLACE * self.solution.elements.nodes[leaf.index()].radius;
+        let far_turned = (SAME_NORMAL * lobe.width).cos();
+        let is_same = |it: &&Shaded| {
+            it.leaf == leaf && it.at.distance_squared(at) <= near * near && it.normal.dot(normal) >= far_turned
+        };
+        if bounce == 0
+            && met.is_plain
+            && let Some(found) = shared.shaded.iter().find(is_same)
+        {
+            return light + found.light;
+        }
+        let reflected =
+            glossy::reflected(self.solution, &*met.reflector, leaf, &place, met.away, 0.0, &mut shared.incident);
+        if bounce == 0 && met.is_plain {
+            shared.shaded.push(Shaded { leaf, at, normal, light: reflected });
+        }
+        light + reflected
     }
 
     /// What is seen from a point along a direction; nothing below the surface.
-    fn along(&self, met: &Met, direction: Vec3, bounce: u32, sampler: &Sampler, scratch: &mut Vec<Incident>) -> Rgb {
+    fn along(&self, met: &Met, direction: Vec3, bounce: u32, sampler: &Sampler, shared: &mut Shared) -> Rgb {
         let side = if met.hit.front { 1.0 } else { -1.0 };
         if direction.dot(met.hit.normal) * side <= 0.0 {
             return Rgb::ZERO;
         }
-        self.seen(met.hit.point, direction, met.hit.surface, bounce + 1, sampler, scratch).1
+        self.seen(met.hit.point, direction, met.hit.surface, bounce + 1, sampler, shared).1
     }
 }
 
@@ -306,7 +349,7 @@ impl<B: Basis> Known for RayCaster<'_, B> {
         if follows && ray.bounce < MOST_BOUNCES {
             return None;
         }
-        Some(self.leaving(*ray.hit, leaf, ray.direction, ray.bounce.max(1), &Sampler::new(0, 0), &mut Vec::new()))
+        Some(self.leaving(*ray.hit, leaf, ray.direction, ray.bounce.max(1), &Sampler::new(0, 0), &mut Shared::default()))
     }
 
     fn nearby(&self, hit: &Hit) -> Option<&Nearby> {
