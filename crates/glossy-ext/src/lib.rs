@@ -13,6 +13,7 @@ mod keep;
 pub mod outgoing;
 pub mod reflector;
 pub mod samples;
+mod wide;
 
 pub use basis::Basis;
 pub use field::{GlossyField, Reflection};

@@ -3,6 +3,7 @@
 
 use crate::Rgb;
 use crate::reflector::{Contour, Incident};
+use crate::wide::FlatPart;
 use glam::{Mat3, Vec2, Vec3};
 use hr_diffuse::hooks::Sides;
 use hr_diffuse::{Hierarchy, NodeId, Transfer};
@@ -104,13 +105,34 @@ pub fn arriving<H: Hierarchy>(
     place: &Place,
     out: &mut Vec<Incident>,
 ) {
+    arrive_all(hierarchy, (leaf, path), place, false, out);
+}
+
+/// The same, each [wide](crate::wide) sender in parts that are not.
+pub fn arriving_in_parts<H: Hierarchy>(
+    hierarchy: &H,
+    leaf: NodeId,
+    path: &[&SampleSet],
+    place: &Place,
+    out: &mut Vec<Incident>,
+) {
+    arrive_all(hierarchy, (leaf, path), place, true, out);
+}
+
+fn arrive_all<H: Hierarchy>(
+    hierarchy: &H,
+    (leaf, path): (NodeId, &[&SampleSet]),
+    place: &Place,
+    in_parts: bool,
+    out: &mut Vec<Incident>,
+) {
     out.clear();
     let mut receiver = leaf;
     for samples in path.iter().rev() {
         if !samples.is_empty() {
             let from = Place::new(hierarchy.center(receiver), hierarchy.normals(receiver).axis);
             for sample in *samples {
-                out.extend(arrived(hierarchy, sample, &from, place));
+                arrive(hierarchy, (sample, &from), place, in_parts, out);
             }
         }
         match hierarchy.parent(receiver) {
@@ -213,29 +235,41 @@ fn together(samples: &[Incident]) -> Incident {
 }
 
 /// The outline of a sender as it is seen from a place, in its frame.
-fn contour<H: Hierarchy>(hierarchy: &H, sender: NodeId, place: &Place) -> Contour {
-    let Some(Sides { across, along, taper }) = hierarchy.sides(sender) else { return Contour::NONE };
-    let to = hierarchy.center(sender) - place.at;
+fn contour(FlatPart { center, sides: Sides { across, along, taper } }: &FlatPart, place: &Place) -> Contour {
+    let to = *center - place.at;
     let distance2 = to.length_squared();
     // Only what is perpendicular to the direction is seen.
-    let seen = |side: Vec3| place.local(side - to * (side.dot(to) / distance2)) / distance2.sqrt();
-    Contour::new(seen(across), seen(along), taper)
+    let seen = |side: &Vec3| place.local(side - to * (side.dot(to) / distance2)) / distance2.sqrt();
+    Contour::new(seen(across), seen(along), *taper)
 }
 
-/// A sample received at `from` as it arrives at `place`; none below the horizon.
-fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Place, place: &Place) -> Option<Incident> {
-    let sender = sample.sender();
+/// Adds a sample received at `from` as it arrives at `place`, of wide senders in parts if these count; nothing below the horizon.
+fn arrive<H: Hierarchy>(
+    hierarchy: &H,
+    (sample, from): (&IlluminationSample, &Place),
+    place: &Place,
+    in_parts: bool,
+    out: &mut Vec<Incident>,
+) {
+    let (sender, oriented) = (sample.sender(), sample.is_oriented());
+    let (center, radius) = (hierarchy.center(sender), hierarchy.radius(sender));
+    let outline = hierarchy.sides(sender).map(|sides| FlatPart { center, sides });
+    if let Some(whole) = outline
+        && in_parts
+        && whole.is_wide(place.at)
+    {
+        return arrive_in_parts((&whole, hierarchy.normals(sender).axis), (sample, from), place, out);
+    }
     let (direction, extent) = hierarchy.direction_to(sender, place.at);
     let cosine = direction.dot(place.normal());
     // A sender with extent may be partly above the horizon though its middle is not; its light is then weak.
-    if cosine <= 0.0 && (extent <= 0.0 || !sample.is_oriented()) {
-        return None;
+    if cosine <= 0.0 && (extent <= 0.0 || !oriented) {
+        return;
     }
     let is_distant = hierarchy.is_distant(sender);
-    let (center, radius) = (hierarchy.center(sender), hierarchy.radius(sender));
     let distance2 = |at: Vec3| center.distance_squared(at) + radius * radius;
     let renewal = if is_distant || from.at == place.at { 1.0 } else { distance2(from.at) / distance2(place.at) };
-    let scale = if sample.is_oriented() {
+    let scale = if oriented {
         // The cosine is in the irradiance already; grazing senders keep what the link's form factor found.
         let before = if is_distant { direction } else { (center - from.at).normalize_or_zero() }.dot(from.normal());
         let turned = if before > 0.1 && cosine > 0.0 { cosine / before } else { 1.0 };
@@ -243,18 +277,52 @@ fn arrived<H: Hierarchy>(hierarchy: &H, sample: &IlluminationSample, from: &Plac
     } else {
         renewal.clamp(MOST_RENEWAL.recip(), MOST_RENEWAL) * cosine
     };
-    Some(Incident {
+    out.push(Incident {
         direction: place.local(direction),
         extent,
         irradiance: sample.irradiance() * scale,
-        contour: if extent > 0.0 { contour(hierarchy, sender, place) } else { Contour::NONE },
+        contour: outline.filter(|_| extent > 0.0).map_or(Contour::NONE, |outline| contour(&outline, place)),
         // Within the ball that holds it nobody knows where its light comes from.
-        nearness: if is_distant {
-            0.0
-        } else {
-            center.distance(place.at).max(radius).max(f32::MIN_POSITIVE).recip()
-        },
-    })
+        nearness: if is_distant { 0.0 } else { center.distance(place.at).max(radius).max(f32::MIN_POSITIVE).recip() },
+    });
+}
+
+/// The same for a [wide](crate::wide) sender with a unit normal. Its form factor is renewed as a whole.
+fn arrive_in_parts(
+    (whole, normal): (&FlatPart, Vec3),
+    (sample, from): (&IlluminationSample, &Place),
+    place: &Place,
+    out: &mut Vec<Incident>,
+) {
+    // The receiver's cosine is in the irradiance, or is not.
+    let counted = |cosine: f32| if sample.is_oriented() { cosine.max(0.0) } else { 1.0 };
+    let (first, mut now, mut before) = (out.len(), 0.0, 0.0);
+    whole.divided(place.at, |part| {
+        let (factor, direction) = part.factor(normal, place.at);
+        let cosine = direction.dot(place.normal());
+        now += factor * counted(cosine);
+        if factor > 0.0 && cosine > 0.0 {
+            out.push(Incident {
+                direction: place.local(direction),
+                extent: factor.min(1.0).sqrt().asin(),
+                irradiance: Rgb::splat(factor * cosine),
+                contour: contour(&part, place),
+                nearness: part.center.distance(place.at).max(f32::MIN_POSITIVE).recip(),
+            });
+        }
+    });
+    if from.at == place.at {
+        before = now;
+    } else {
+        whole.divided(from.at, |part| {
+            let (factor, direction) = part.factor(normal, from.at);
+            before += factor * counted(direction.dot(from.normal()));
+        });
+    }
+    let renewal = if before > 0.0 { (now / before).clamp(MOST_RENEWAL.recip(), MOST_RENEWAL) } else { 1.0 };
+    for part in &mut out[first..] {
+        part.irradiance = part.irradiance / now * renewal * sample.irradiance();
+    }
 }
 
 #[cfg(test)]

@@ -127,7 +127,8 @@ fn point(scene: &Arc<Scene>) -> Result<Image, BenchError> {
     let mut incident = Vec::new();
     arriving(&solution.elements, leaf, &solution.incident_path(leaf), &place, &mut incident);
     let samples = hemisphere(|direction| incident.iter().map(|sample| disk(sample, direction)).sum());
-    let away = |direction: Vec3| solution.reflected[leaf.index()].eval(place.frame * direction);
+    let shown = solution.faces.standing(leaf.0) as usize;
+    let away = |direction: Vec3| solution.reflected[shown].eval(place.frame * direction);
     Ok(side_by_side(&[vec![there, samples, hemisphere(away)]]))
 }
 

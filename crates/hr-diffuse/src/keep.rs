@@ -5,6 +5,7 @@
 //! tree, all light is finite.
 
 use crate::budget::Spent;
+use crate::face_clusters::FaceClusters;
 use crate::flat::{FlatError, Reader, Writer, are_offsets, fits, is_finite};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::LightField;
@@ -111,7 +112,21 @@ impl<L: Keep> Solution<L> {
         let (incident, reflected) = field.restore(count, from)?;
         fits(incident.len() == count && reflected.len() == count, "extension's light")?;
         stats.seconds.build = start.elapsed().as_secs_f64();
-        Ok(Self { scene, elements, exitant, links, vertices, field, incident, reflected, faint, stats, unfinished })
+        let faces = FaceClusters::new(&elements, &links).with_vertices(&elements, &vertices);
+        Ok(Self {
+            scene,
+            elements,
+            exitant,
+            links,
+            vertices,
+            field,
+            incident,
+            reflected,
+            faint,
+            faces,
+            stats,
+            unfinished,
+        })
     }
 }
 
@@ -330,7 +345,7 @@ impl Vertices {
 
 impl Stats {
     /// All counters, in the order in which they are kept.
-    fn counters(&mut self) -> [&mut u64; 22] {
+    fn counters(&mut self) -> [&mut u64; 23] {
         let Self {
             polygons,
             nodes,
@@ -363,6 +378,7 @@ impl Stats {
             converged_leaves,
             faint_links,
             inner_vertices,
+            joined_leaves,
             shot_links,
         } = skipped;
         [
@@ -387,6 +403,7 @@ impl Stats {
             converged_leaves,
             faint_links,
             inner_vertices,
+            joined_leaves,
             shot_links,
         ]
     }
@@ -407,7 +424,7 @@ impl Stats {
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
         let mut stats = Self::default();
-        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 22>(WHAT)?) {
+        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 23>(WHAT)?) {
             *counter = kept;
         }
         let [iterations, stopped, spent] = from.take_exactly::<u64, 3>(WHAT)?;

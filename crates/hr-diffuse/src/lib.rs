@@ -18,6 +18,7 @@ mod contacts;
 mod convergence;
 pub mod error;
 mod exposed;
+pub mod face_clusters;
 pub mod facing;
 pub mod flat;
 mod footprint;

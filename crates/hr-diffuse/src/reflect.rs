@@ -4,6 +4,7 @@
 //! averages over all directions.
 
 use crate::columns::gains;
+use crate::face_clusters::FaceClusters;
 use crate::hierarchy::Elements;
 use crate::hooks::{Arrived, LightField, NodeId};
 use crate::links::Links;
@@ -69,7 +70,7 @@ pub struct Senders {
 impl Senders {
     /// Those of a set of links, and `others`. `reflects` tells of which leaves the extension makes directional light.
     pub(crate) fn new(
-        elements: &Elements,
+        (elements, faces): (&Elements, &FaceClusters),
         links: &Links,
         others: impl Iterator<Item = u32>,
         reflects: impl Fn(u32) -> bool,
@@ -93,11 +94,16 @@ impl Senders {
             }
             if element.child_count == 0 {
                 if reflects(node as u32) {
-                    standing[node].push((node as u32, element.area));
+                    standing[node].push((faces.standing(node as u32), element.area));
                 }
             } else {
                 let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
-                let all: Vec<(u32, f32)> = standing[children].iter().flatten().copied().collect();
+                let mut all: Vec<(u32, f32)> = standing[children].iter().flatten().copied().collect();
+                all.dedup_by(|next, kept| {
+                    let is_same = next.0 == kept.0;
+                    kept.1 += if is_same { next.1 } else { 0.0 };
+                    is_same
+                });
                 standing[node] = thinned(all, node as u32);
             }
             if sends[node] {
@@ -120,7 +126,7 @@ impl Senders {
 
     /// All leaves that stand for something, in order, each with the angle within which the normals are for which it
     /// stands, its own among them: the least where it stands for several nodes.
-    fn leaves(&self, elements: &Elements) -> Vec<Standing> {
+    fn leaves(&self, elements: &Elements, faces: &FaceClusters) -> Vec<Standing> {
         let mut leaves: Vec<Standing> = Vec::with_capacity(self.standing.len());
         for (node, element) in elements.nodes.iter().enumerate() {
             let standing = self.of(node as u32);
@@ -130,7 +136,7 @@ impl Senders {
             let spread = (element.normals.angle() * share).max(0.0);
             leaves.extend(standing.iter().map(|&Representative { leaf, .. }| Standing {
                 leaf,
-                spread,
+                spread: spread.max(faces.spread(elements, leaf)),
                 negligible: 0.0,
             }));
         }
@@ -178,6 +184,11 @@ fn thinned(all: Vec<(u32, f32)>, seed: u32) -> Areas {
 }
 
 impl<L: LightField> Solver<L> {
+    /// Leaves that stand for others, by the links that there are.
+    pub(crate) fn face_clusters(&self) -> FaceClusters {
+        if self.skips.face_clusters { FaceClusters::new(&self.elements, &self.links) } else { FaceClusters::default() }
+    }
+
     /// Reflects light that arrived at senders, until `watch` breaks: all of it where it has changed, or what is new.
     pub(crate) fn reflect_senders(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         self.shown.clear();
@@ -205,10 +216,11 @@ impl<L: LightField> Solver<L> {
         // What is pure metal has no diffuse light, and gets no links while it is dark: it is lit now.
         let waiting = self.unfinished.unlit.iter().map(|pair| pair.sender);
         let lit = waiting.filter(|&sender| self.exitant.directional[sender as usize] != Rgb::ZERO);
-        let mut senders = Senders::new(elements, &self.links, lit, |leaf| {
+        let faces = self.face_clusters();
+        let mut senders = Senders::new((elements, &faces), &self.links, lit, |leaf| {
             faint[elements.nodes[leaf as usize].material as usize] == Rgb::ZERO
         });
-        let mut leaves = senders.leaves(elements);
+        let mut leaves = senders.leaves(elements, &faces);
         if self.skips.negligible_detail {
             self.weigh(&senders, new.is_some(), &mut leaves);
         }
@@ -345,7 +357,7 @@ impl<L: LightField> Solver<L> {
         shown: bool,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Vec<L::Exitant> {
-        let (elements, error) = (&self.elements, self.settings.error);
+        let (elements, error, light) = (&self.elements, self.settings.error, self.light());
         let reflect = |&Standing { leaf, spread, negligible }: &Standing| {
             let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
             let mut node = leaf;
@@ -357,12 +369,12 @@ impl<L: LightField> Solver<L> {
             let element = &elements.nodes[leaf as usize];
             let irradiance = new.unwrap_or(&self.exitant.irradiance)[leaf as usize];
             let diffuse = irradiance * element.reflectance * FRAC_1_PI;
-            self.field.reflect(
-                elements,
-                NodeId(leaf),
-                &path,
-                Arrived { irradiance, diffuse, spread, negligible, error, shown },
-            )
+            let arrived = Arrived { irradiance, diffuse, spread, negligible, error, shown };
+            if shown {
+                self.field.reflect(&light, NodeId(leaf), &path, arrived)
+            } else {
+                self.field.reflect(elements, NodeId(leaf), &path, arrived)
+            }
         };
         let mut exitant: Vec<L::Exitant> = Vec::with_capacity(leaves.len());
         for part in leaves.chunks(BETWEEN_WATCHES * threads::current_num_threads()) {
@@ -382,12 +394,13 @@ impl<L: LightField> Solver<L> {
         let start = std::time::Instant::now();
         let shown = SHOWN_SHARE * self.settings.error * self.mean_irradiance() * FRAC_1_PI;
         let negligible = if self.skips.negligible_detail { shown } else { 0.0 };
-        let active = |leaf: &u32| self.elements.nodes[*leaf as usize].active;
+        let faces = self.face_clusters();
+        let counts = |leaf: &u32| self.elements.nodes[*leaf as usize].active && faces.standing(*leaf) == *leaf;
         let leaves: Vec<Standing> = self
             .elements
             .patch_leaves()
-            .filter(active)
-            .map(|leaf| Standing { leaf, spread: self.bend(leaf), negligible })
+            .filter(counts)
+            .map(|leaf| Standing { leaf, spread: self.bend(leaf).max(faces.spread(&self.elements, leaf)), negligible })
             .collect();
         let progress = self.progress(Phase::Transport, 0.9);
         let (mut done, mut stopped) = (0, false);

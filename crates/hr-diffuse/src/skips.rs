@@ -17,6 +17,8 @@ pub(crate) struct Skips {
     pub(crate) faint_links: bool,
     /// Values at vertices within places of many leaves.
     pub(crate) inner_vertices: bool,
+    /// Directional light of each leaf of a cluster whose leaves reflect alike.
+    pub(crate) face_clusters: bool,
     /// Directional detail that makes no difference to what links carry.
     pub(crate) negligible_detail: bool,
 }
@@ -31,6 +33,7 @@ impl Skips {
         converged_leaves: true,
         faint_links: true,
         inner_vertices: true,
+        face_clusters: true,
         negligible_detail: true,
     };
 }

@@ -1,5 +1,6 @@
 //! A finished solution: what is read from it to show it.
 
+use crate::face_clusters::FaceClusters;
 use crate::hierarchy::{Elements, SceneData};
 use crate::hooks::{LightField, NodeId};
 use crate::links::Links;
@@ -35,6 +36,8 @@ pub struct Solution<L: LightField = ()> {
     pub reflected: Vec<L::Exitant>,
     /// By material: what is reflected beside the diffuse part, where transport carried it as diffuse light.
     pub faint: Vec<Rgb>,
+    /// Leaves that stand for others.
+    pub faces: FaceClusters,
     /// Work done and avoided.
     pub stats: Stats,
     /// What is left to be done.
@@ -46,6 +49,8 @@ impl<L: LightField> Solver<L> {
     /// the elements around them.
     pub fn finish(mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Solution<L> {
         let start = Instant::now();
+        let faces = self.face_clusters();
+        self.stats.skipped.joined_leaves = faces.joined(&self.elements);
         let (links, nodes) = (self.links.all().len() as u64, self.elements.nodes.len() as u64);
         let error = self.settings.error;
         let mut stopped = false;
@@ -76,6 +81,7 @@ impl<L: LightField> Solver<L> {
         for (leaf, exitant) in curved {
             self.reflected[leaf as usize] = exitant;
         }
+        let faces = faces.with_vertices(&self.elements, &vertices);
         self.stats.seconds.reconstruct += start.elapsed().as_secs_f64();
         Solution {
             scene: self.scene,
@@ -87,6 +93,7 @@ impl<L: LightField> Solver<L> {
             incident: self.incident,
             reflected: self.reflected,
             faint: self.faint,
+            faces,
             stats: self.stats,
             unfinished: self.unfinished,
         }

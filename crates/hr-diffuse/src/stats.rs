@@ -71,6 +71,8 @@ pub struct Skipped {
     pub faint_links: u64,
     /// Vertices that gather nothing, as they lie within a place of many leaves that gathered for them.
     pub inner_vertices: u64,
+    /// Leaves whose directional light is that of another one of their cluster.
+    pub joined_leaves: u64,
     /// Links over which nothing was shot in an iteration, as their senders had next to no unshot light.
     pub shot_links: u64,
 }
@@ -86,6 +88,7 @@ impl std::ops::AddAssign for Skipped {
         self.converged_leaves += other.converged_leaves;
         self.faint_links += other.faint_links;
         self.inner_vertices += other.inner_vertices;
+        self.joined_leaves += other.joined_leaves;
         self.shot_links += other.shot_links;
     }
 }

@@ -102,6 +102,7 @@ impl Anatomy<'_> {
         };
         let element = &solution.elements.nodes[leaf.index()];
         let axis = element.normals.axis;
+        let shown = NodeId(solution.faces.standing(leaf.0));
         // Metres per unit: areas of the scene.
         let area = f64::from(element.area) / solution.scene.normalization.scale().powi(2);
         let path = self.path(leaf);
@@ -111,19 +112,19 @@ impl Anatomy<'_> {
         let diffuse = solution.exitant.radiosity[leaf.index()];
         say.push(format!("radiosity {} W/m² diffuse, with emission", three(diffuse)));
         let away = (eye - hit.point).normalize_or(axis);
-        let (glossy, _) = glossy::leaving(solution, leaf, hit.point, glossy::mirrored(axis, away));
+        let (glossy, _) = glossy::leaving(solution, shown, hit.point, glossy::mirrored(axis, away));
         let is_glossy = !material.reflector.is_diffuse();
         if is_glossy {
             let albedo = material.reflector.glossy_albedo() + material.reflector.mirror();
             say.push(format!("radiance {} W/(m² sr) glossy, toward the eye", three(glossy)));
             say.push(format!("glossy reflectance {}", three(albedo)));
-            let haar = &solution.reflected[leaf.index()];
+            let haar = &solution.reflected[shown.index()];
             say.push(format!("distribution of {} basis functions", haar.basis_functions()));
         }
         self.outline(&mut finding.lines, leaf.0, [1.0, 0.75, 0.0, 1.0]);
         self.arrows(&mut finding, leaf, &path, hit.point);
         self.links(&mut finding, &path, hit.point);
-        self.balloon(&mut finding, leaf, element, hit.point, diffuse * FRAC_1_PI, is_glossy);
+        self.balloon(&mut finding, shown, element, hit.point, diffuse * FRAC_1_PI, is_glossy);
         finding
     }
 

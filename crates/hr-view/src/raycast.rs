@@ -8,7 +8,7 @@ use crate::glossy::{self, FOLLOWED, Mode, NARROWEST};
 use crate::path_tracer::{Glow, Known, Nearby, PathTracer, Place as Lit, Ray, Sampler};
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::haar::Haar;
-use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector};
+use glossy_ext::{Basis, GlossyField, Incident, Lobe, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2};
 use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
@@ -42,10 +42,11 @@ const GLOWING: f32 = 4.0;
 const MOST_GLOWING: usize = 1024;
 /// The darkest leaf of a part that glows has at least this share of the light of the brightest.
 const EVEN: f32 = 0.3;
-/// Rays of a pixel that meet a leaf at places which are no further apart than this share of its radius, with normals that differ by no
-/// more than this share of the lobe's width, see the same glossy light.
+/// Glossy light of samples is found once for the rays of a pixel, in its middle: the mean of what changes evenly over the pixel. It
+/// stands for that of points which are no further away than this share of their leaf's radius, and where what is seen
+/// mirrored differs by no more than this share of the lobe's width.
 const SAME_PLACE: f32 = 0.25;
-const SAME_NORMAL: f32 = 0.06;
+const SAME_DIRECTION: f32 = 0.1;
 /// Rays start this far from their surface (unit space): what rounding needs.
 const START: f32 = 1e-6;
 
@@ -74,8 +75,12 @@ struct Met {
     /// Unit direction back along the ray.
     away: Vec3,
     reflector: Arc<dyn Reflector>,
-    /// Whether no texture changes what it reflects from place to place.
-    is_plain: bool,
+}
+
+impl Met {
+    fn place(&self) -> Place {
+        Place::along(self.hit.point, self.normal, self.reflector.grain())
+    }
 }
 
 /// What the rays of a pixel have in common.
@@ -83,15 +88,19 @@ struct Met {
 struct Shared {
     /// Saves allocations.
     incident: Vec<Incident>,
-    /// Glossy light that was found at leaves.
-    shaded: Vec<Shaded>,
+    /// What is seen in its middle.
+    middle: Option<Shaded>,
 }
 
-/// Glossy light of a leaf toward the pixel, of samples that arrive.
+/// Glossy light toward a pixel of samples that arrive.
 struct Shaded {
-    leaf: NodeId,
+    /// The [face cluster](hr_diffuse::face_clusters) that they arrive at.
+    cluster: u32,
     at: Vec3,
-    normal: Vec3,
+    /// Unit direction of what is seen mirrored.
+    seen: Vec3,
+    /// Of the lobe.
+    width: f32,
     light: Rgb,
 }
 
@@ -194,7 +203,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
         let (rays, seed) = (self.grid * self.grid, hash(x as u32, y as u32 ^ 0x6b43));
         let mut pixel = Pixel::default();
-        shared.shaded.clear();
+        shared.middle = self.middle(eye, camera.direction(x as f64 + 0.5, y as f64 + 0.5).as_vec3(), shared);
         for i in 0..rays * (1 + rounds) {
             let sampler = Sampler::new(seed, i);
             let within = if i < rays {
@@ -209,6 +218,25 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             pixel.add(surface, light);
         }
         pixel
+    }
+
+    /// The glossy light of the leaf in the middle of a pixel, where it is that of samples.
+    fn middle(&self, eye: Vec3, direction: Vec3, shared: &mut Shared) -> Option<Shaded> {
+        if self.mode != Mode::Samples {
+            return None;
+        }
+        let hit = self.solution.scene.visibility.closest_except(eye, direction, START, f32::MAX, u32::MAX)?;
+        let leaf =
+            self.solution.leaf(&hit).filter(|_| self.scene.base_color(hit.surface, hit.uv.x, hit.uv.y).is_none())?;
+        let reflector = Arc::clone(&self.material(&hit).reflector);
+        if reflector.is_diffuse() || reflector.glossy_albedo() == Rgb::ZERO {
+            return None;
+        }
+        let met = self.met(hit, leaf, direction, reflector);
+        let lobe = self.lobe(&met).filter(|_| met.reflector.mirror() == Rgb::ZERO)?;
+        let light = self.by_samples(&met, shared);
+        let cluster = self.solution.faces.standing(leaf.0);
+        Some(Shaded { cluster, at: hit.point, seen: glossy::mirrored(met.normal, met.away), width: lobe.width, light })
     }
 
     /// The surface that is seen from `origin` (unit space) in `direction`, and the radiance that arrives.
@@ -246,9 +274,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     ) -> Rgb {
         let material = self.material(&hit);
         let element = &self.solution.elements.nodes[leaf.index()];
-        let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
         let base_color = self.scene.base_color(hit.surface, hit.uv.x, hit.uv.y);
-        let is_plain = base_color.is_none();
         let reflector = base_color
             .and_then(|color| material.reflector.with_base_color(color))
             .unwrap_or_else(|| Arc::clone(&material.reflector));
@@ -257,12 +283,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         if reflector.is_diffuse() {
             return diffuse;
         }
-        let away = -direction.normalize();
-        let shading = self.solution.scene.shading_normal(hit.surface, hit.uv) * side;
-        // A shading normal that does not see the eye would hide the surface: bend it until it just does.
-        let facing = shading.dot(away);
-        let normal = if facing > 0.02 { shading } else { (shading + away * (0.02 - facing)).normalize() };
-        let met = Met { hit, leaf, normal, away, reflector, is_plain };
+        let met = self.met(hit, leaf, direction, reflector);
         let faint = self.solution.faint[element.material as usize];
         let mirrors = met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES;
         let glossy = match self.mode {
@@ -270,13 +291,36 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             Mode::Samples if bounce == 0 || mirrors => self.reflected(&met, bounce, sampler, shared),
             Mode::Samples | Mode::Gather if faint != Rgb::ZERO => faint * irradiance * FRAC_1_PI,
             // Of leaves whose light no link asked for there is no distribution.
-            Mode::Samples | Mode::Gather if self.solution.reflected[leaf.index()].is_empty() => {
-                let place = Place::along(met.hit.point, met.normal, met.reflector.grain());
+            Mode::Samples | Mode::Gather
+                if self.solution.reflected[self.solution.faces.standing(leaf.0) as usize].is_empty() =>
+            {
+                let (place, away) = (met.place(), met.away);
                 glossy::reflected(self.solution, &*met.reflector, leaf, &place, away, NARROWEST, &mut shared.incident)
             }
             Mode::Samples | Mode::Gather => self.interpolated(&met),
         };
         (diffuse + glossy).max(Rgb::ZERO)
+    }
+
+    /// A point that a ray met, which is reflected by this reflector.
+    fn met(&self, hit: Hit, leaf: NodeId, direction: Vec3, reflector: Arc<dyn Reflector>) -> Met {
+        let side = if self.solution.elements.nodes[leaf.index()].kind == Kind::Back { -1.0 } else { 1.0 };
+        let away = -direction.normalize();
+        let shading = self.solution.scene.shading_normal(hit.surface, hit.uv) * side;
+        // A shading normal that does not see the eye would hide the surface: bend it until it just does.
+        let facing = shading.dot(away);
+        let normal = if facing > 0.02 { shading } else { (shading + away * (0.02 - facing)).normalize() };
+        Met { hit, leaf, normal, away, reflector }
+    }
+
+    /// The lobe toward the ray's origin; none where it is so narrow that it is followed.
+    fn lobe(&self, met: &Met) -> Option<Lobe> {
+        Some(met.reflector.lobe(met.place().local(met.away))).filter(|lobe| lobe.width >= FOLLOWED)
+    }
+
+    /// Glossy radiance from the samples that arrive at the point.
+    fn by_samples(&self, met: &Met, shared: &mut Shared) -> Rgb {
+        glossy::reflected(self.solution, &*met.reflector, met.leaf, &met.place(), met.away, 0.0, &mut shared.incident)
     }
 
     /// Glossy radiance from the distributions around the point.
@@ -287,8 +331,6 @@ impl<'a, B: Basis> RayCaster<'a, B> {
 
     /// Glossy radiance from the samples that arrive at the point, or along rays where the lobe is narrow.
     fn reflected(&self, met: &Met, bounce: u32, sampler: &Sampler, shared: &mut Shared) -> Rgb {
-        let place = Place::along(met.hit.point, met.normal, met.reflector.grain());
-        let outgoing = place.local(met.away);
         let mirror = met.reflector.mirror();
         let mut light = Rgb::ZERO;
         if mirror != Rgb::ZERO {
@@ -298,8 +340,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         if met.reflector.glossy_albedo() == Rgb::ZERO {
             return light;
         }
-        let lobe = met.reflector.lobe(outgoing);
-        if lobe.width < FOLLOWED {
+        if self.lobe(met).is_none() {
             let turns: [Vec2; LOBE_RAYS] = std::array::from_fn(|k| sampler.split(LOBE_RAYS as u32, k as u32).pair(1));
             let pairs = [2, 3].map(|dimension| sampler.pair(dimension));
             let mut number = 0;
@@ -310,24 +351,15 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             };
             return light + self.tracer.glossy(&met.hit, -met.away, pairs, &turns, &mut beyond);
         }
-        let (at, normal, leaf) = (place.at, met.normal, met.leaf);
-        let near = SAME_PLACE * self.solution.elements.nodes[leaf.index()].radius;
-        let far_turned = (SAME_NORMAL * lobe.width).cos();
-        let is_same = |it: &&Shaded| {
-            it.leaf == leaf && it.at.distance_squared(at) <= near * near && it.normal.dot(normal) >= far_turned
-        };
-        if bounce == 0
-            && met.is_plain
-            && let Some(found) = shared.shaded.iter().find(is_same)
-        {
-            return light + found.light;
-        }
-        let reflected =
-            glossy::reflected(self.solution, &*met.reflector, leaf, &place, met.away, 0.0, &mut shared.incident);
-        if bounce == 0 && met.is_plain {
-            shared.shaded.push(Shaded { leaf, at, normal, light: reflected });
-        }
-        light + reflected
+        let shared_light = shared.middle.as_ref().filter(|middle| bounce == 0 && self.is_same(middle, met));
+        light + shared_light.map(|middle| middle.light).unwrap_or_else(|| self.by_samples(met, shared))
+    }
+
+    /// Whether the glossy light in the middle of a pixel stands for that of a point.
+    fn is_same(&self, middle: &Shaded, met: &Met) -> bool {
+        self.solution.faces.standing(met.leaf.0) == middle.cluster
+            && middle.at.distance(met.hit.point) <= SAME_PLACE * self.solution.elements.nodes[met.leaf.index()].radius
+            && middle.seen.distance(glossy::mirrored(met.normal, met.away)) <= SAME_DIRECTION * middle.width
     }
 
     /// What is seen from a point along a direction; nothing below the surface.
@@ -349,7 +381,14 @@ impl<B: Basis> Known for RayCaster<'_, B> {
         if follows && ray.bounce < MOST_BOUNCES {
             return None;
         }
-        Some(self.leaving(*ray.hit, leaf, ray.direction, ray.bounce.max(1), &Sampler::new(0, 0), &mut Shared::default()))
+        Some(self.leaving(
+            *ray.hit,
+            leaf,
+            ray.direction,
+            ray.bounce.max(1),
+            &Sampler::new(0, 0),
+            &mut Shared::default(),
+        ))
     }
 
     fn nearby(&self, hit: &Hit) -> Option<&Nearby> {

@@ -70,6 +70,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "converged_leaves": skipped.converged_leaves,
             "faint_links": skipped.faint_links,
             "inner_vertices": skipped.inner_vertices,
+            "joined_leaves": skipped.joined_leaves,
             "shot_links": skipped.shot_links,
             "negligible_detail": solution.field.counters().negligible_detail(),
         },

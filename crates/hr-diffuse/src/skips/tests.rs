@@ -227,6 +227,39 @@ fn leaves_whose_light_has_settled_change_little() {
     assert!(apart < ERROR, "{apart} of the mean radiosity");
 }
 
+/// The room with its floor in many pieces, which reflect like the other walls.
+fn cut_room() -> SceneInput {
+    const PARTS: u32 = 48;
+    let mut input = room();
+    input.materials[GREY as usize].reflectance = Rgb::splat(0.3);
+    let part = f64::from(PARTS).recip();
+    let piece = |i: u32| DVec3::new(f64::from(i % PARTS), f64::from(i / PARTS), 0.0) * part;
+    let pieces = (0..PARTS * PARTS).map(|i| {
+        let (a, x, y) = (piece(i), DVec3::X * part, DVec3::Y * part);
+        Surface::new(Shape::Quad([a, a + x, a + x + y, a + y]), GREY)
+    });
+    input.surfaces.splice(0..1, pieces);
+    input
+}
+
+/// What one leaf of a face cluster reflects stands for all of it, and for the light that goes on from there.
+#[test]
+fn leaves_of_face_clusters_change_little() {
+    const ERROR: f32 = 0.1;
+    let field = || Echo { material: GREY, albedo: 0.3, errs: false };
+    let with = solve(&cut_room(), ERROR, field(), Skips::ALL);
+    let without = solve(&cut_room(), ERROR, field(), Skips { face_clusters: false, ..Skips::ALL });
+    let [some, none] = [&with, &without].map(|solver| solver.face_clusters().joined(&solver.elements));
+    assert!(some > 1000 && none == 0, "{some} of {} leaves, then {none}", with.stats.leaves);
+    let [with_them, all] = [&with, &without].map(|solver| {
+        let stand = |leaf: &u32| solver.last_reflected[*leaf as usize].x >= 0.0;
+        solver.elements.patch_leaves().filter(stand).count()
+    });
+    assert!(3 * with_them < 2 * all, "{with_them} of {all} leaves are reflected");
+    let apart = difference(&radiosities(&with), &radiosities(&without), with.exitant.radiosity[0]);
+    assert!(apart < 0.5 * ERROR, "{apart} of the mean radiosity");
+}
+
 /// What leaves are told to be negligible makes no difference to the light in the room, though each errs by all of it.
 #[test]
 fn negligible_detail_changes_little() {

@@ -8,6 +8,7 @@ mod edges;
 mod facets;
 mod gather;
 mod highlights;
+mod meshes;
 mod pixels;
 #[path = "../room/mod.rs"]
 mod room;

@@ -1,0 +1,99 @@
+//! Glossy light of what is cut finely, and in pictures with many rays.
+
+use glam::{DVec3, Vec3};
+use glossy_ext::reflector::{MetallicRoughness, Reflector, Ward};
+use hr_diffuse::{Settings, Shape, Surface};
+use hr_scene::{Camera, Image, Material, Rgb, Scene};
+use hr_view::Mode;
+use hr_view::raycast::RayCaster;
+use hr_view::solved::Solved;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+const GLOSSY: u32 = 0;
+const WALL: u32 = 1;
+const LAMP: u32 = 2;
+
+fn material(reflector: impl Reflector + 'static, exitance: f32) -> Material {
+    Material {
+        name: String::new(),
+        reflector: Arc::new(reflector),
+        exitance: Rgb::splat(exitance),
+        two_sided: false,
+        texture: None,
+        base_color: Rgb::ONE,
+    }
+}
+
+fn quad(corner: DVec3, a: DVec3, b: DVec3, material: u32) -> Surface {
+    Surface::new(Shape::Quad([corner, corner + a, corner + a + b, corner + b]), material)
+}
+
+/// A glossy floor in `parts` by `parts` pieces before a wall, below a lamp.
+fn floor(parts: u32, reflector: impl Reflector + 'static) -> Arc<Scene> {
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let part = 2.0 / f64::from(parts);
+    let piece = |i: u32| DVec3::new(f64::from(i % parts), f64::from(i / parts), 0.0) * part;
+    let mut surfaces: Vec<Surface> = (0..parts * parts).map(|i| quad(piece(i), x * part, y * part, GLOSSY)).collect();
+    surfaces.push(quad(y * 2.0, x * 2.0, z, WALL));
+    surfaces.push(quad(DVec3::new(0.8, 1.2, 1.0), y * 0.4, x * 0.4, LAMP));
+    let wall = MetallicRoughness::new(Rgb::new(0.7, 0.5, 0.3), 0.0, 1.0).expect("a wall");
+    let black = Ward::new(Rgb::ZERO, Rgb::ZERO, 0.5).expect("black");
+    let materials = vec![material(reflector, 0.0), material(wall, 0.0), material(black, 10.0)];
+    Arc::new(Scene { surfaces, materials, ..Scene::default() }.finish().expect("a sound scene"))
+}
+
+fn solved(scene: &Arc<Scene>) -> Solved {
+    let watch = &mut |_: &_| ControlFlow::Continue(());
+    Solved::new(Arc::clone(scene), Settings::with_error(0.1), true, watch).expect("a sound scene")
+}
+
+fn camera(width: u32) -> Camera {
+    let (eye, target) = ([1.0, 0.3, 0.8], [1.0, 1.1, 0.0]);
+    Camera { eye, target, up: [0.0, 0.0, 1.0], fov_x: 45.0, width, height: width }
+}
+
+fn picture(solved: &Solved, mode: Mode, grid: u32, width: u32) -> Image {
+    RayCaster::new(&solved.scene, &solved.solution, mode).with_grid(grid).render(&camera(width), &|_| ())
+}
+
+/// Means of squares of pixels.
+fn means(image: &Image, side: usize) -> Vec<Vec3> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let square = |i: usize| {
+        let (x, y) = (i % (width / side) * side, i / (width / side) * side);
+        let pixels = (0..side * side).map(|k| image.pixels[(y + k / side) * width + x + k % side]);
+        pixels.sum::<Vec3>() / (side * side) as f32
+    };
+    (0..(width / side) * (height / side)).map(square).collect()
+}
+
+fn difference(a: &[Vec3], b: &[Vec3]) -> f32 {
+    let off: f32 = a.iter().zip(b).map(|(a, b)| (*a - *b).abs().element_sum()).sum();
+    off / a.iter().map(|light| light.element_sum()).sum::<f32>()
+}
+
+/// However finely a floor is cut, it shows the same, and has not many more distributions.
+#[test]
+fn a_floor_shows_the_same_in_many_pieces() {
+    let metal = || MetallicRoughness::new(Rgb::new(0.9, 0.8, 0.7), 1.0, 0.5).expect("a metal");
+    let [whole, cut] = [1, 64].map(|parts| solved(&floor(parts, metal())));
+    let [few, many] = [&whole, &cut].map(|it| it.solution.reflected.iter().filter(|light| !light.is_empty()).count());
+    let leaves = cut.solution.stats.leaves as usize;
+    assert!(leaves > 4000 && 4 * many < leaves, "{many} distributions of {leaves} leaves, {few} where it is whole");
+    let [whole, cut] = [whole, cut].map(|it| means(&picture(&it, Mode::Distributions, 2, 96), 4));
+    let off = difference(&whole, &cut);
+    // Were clusters not blended, 7 % would be off.
+    assert!(off < 0.05, "{off} of the light");
+}
+
+/// The middle of a pixel stands for its rays: a picture of as many pixels as there were rays, each with its own light, is the same.
+#[test]
+fn rays_of_a_pixel_see_what_its_middle_shows() {
+    let gloss = Ward::new(Rgb::splat(0.2), Rgb::splat(0.5), 0.2).expect("a gloss");
+    let solved = solved(&floor(1, gloss));
+    let shared = picture(&solved, Mode::Samples, 3, 96);
+    let apart = picture(&solved, Mode::Samples, 1, 288);
+    let off = difference(&means(&shared, 2), &means(&apart, 6));
+    assert!(off < 0.005, "{off} of the light");
+}
