@@ -108,7 +108,7 @@ pub fn arriving<H: Hierarchy>(
     arrive_all(hierarchy, (leaf, path), place, false, out);
 }
 
-/// The same, each [wide](crate::wide) sender in parts that are not.
+/// The same, each sender that takes up much of the view in parts that do not.
 pub fn arriving_in_parts<H: Hierarchy>(
     hierarchy: &H,
     leaf: NodeId,

@@ -30,13 +30,13 @@ impl FlatPart {
     }
 
     /// Irradiance at a place, across the direction, by its radiosity (a form factor), and the unit direction toward it; its unit
-    /// normal is given. Near ones count as disks overhead, so that none is more than 1.
+    /// normal is given. None is more than 1.
     pub(crate) fn factor(&self, normal: Vec3, at: Vec3) -> (f32, Vec3) {
         let to = self.center - at;
         let (distance2, area) = (to.length_squared(), self.area());
         let direction = to / distance2.sqrt().max(f32::MIN_POSITIVE);
-        let factor = area * normal.dot(-direction).max(0.0) / (PI * distance2 + area);
-        (if factor.is_finite() { factor } else { 0.0 }, direction)
+        let factor = area * normal.dot(-direction).max(0.0) / (PI * distance2);
+        (if factor.is_finite() { factor.min(1.0) } else { 0.0 }, direction)
     }
 
     /// Whether it is wide, seen from a place.
@@ -150,9 +150,11 @@ mod tests {
                 assert!(off.iter().all(|off| off.abs() < 0.1), "height {height}: off by {off:?}");
                 let turned = direction.normalize().angle_between(mean);
                 let middle = (floor.center - at).angle_between(mean);
+                // From afar the middle is not far off.
+                let is_near = height < 1.0;
                 assert!(
-                    turned < 0.1 && turned < 0.3 * middle,
-                    "height {height}: {turned} rad off, its middle {middle}"
+                    turned < if is_near { 0.2 * middle } else { 0.06 },
+                    "height {height}: {turned} of {middle} rad off"
                 );
             }
         }

@@ -16,7 +16,7 @@ use smallvec::SmallVec;
 const NORMALS: f32 = 0.1;
 
 /// Vertices take the light of face clusters whose middles are nearer than so many times their radius.
-const REACH: f32 = 2.0;
+const REACH: f32 = 3.0;
 
 /// Which leaf's directional light stands for that of which leaves.
 #[derive(Clone, Debug, Default)]
