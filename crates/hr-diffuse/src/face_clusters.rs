@@ -89,12 +89,17 @@ impl FaceClusters {
                 near.sort_unstable();
                 near.dedup();
                 let at = vertices.positions[vertex as usize];
-                shares.extend(near.into_iter().filter_map(|cluster| {
-                    let (element, leaf) = (&elements.nodes[cluster as usize], self.standing(cluster));
-                    let off = element.center.distance(at) / (REACH * element.radius).max(f32::MIN_POSITIVE);
-                    let share = (1.0 - off).max(0.0).powi(2) * elements.exposed(leaf);
-                    (share > 0.0).then_some((leaf, share))
-                }));
+                let weights: SmallVec<[(u32, f32); 16]> = near
+                    .into_iter()
+                    .map(|cluster| {
+                        let (element, leaf) = (&elements.nodes[cluster as usize], self.standing(cluster));
+                        let off = element.center.distance(at) / (REACH * element.radius).max(f32::MIN_POSITIVE);
+                        (leaf, (1.0 - off).max(0.0).powi(2) * elements.exposed(leaf))
+                    })
+                    .filter(|&(_, weight)| weight > 0.0)
+                    .collect();
+                let all: f32 = weights.iter().map(|(_, weight)| weight).sum();
+                shares.extend(weights.into_iter().map(|(leaf, weight)| (leaf, weight / all)));
             }
             first_around.push(shares.len() as u32);
         }
@@ -108,7 +113,8 @@ impl FaceClusters {
         self.by_node.get(leaf as usize).map_or(leaf, |&(standing, _)| standing)
     }
 
-    /// The leaves whose directional light a vertex takes, with shares; none where it takes that of the leaves around it.
+    /// The leaves whose directional light a vertex takes, with shares that sum to 1; none where it takes that of the leaves
+    /// around it.
     #[must_use]
     pub fn around(&self, vertex: u32) -> &[(u32, f32)] {
         match self.first_around.get(vertex as usize..vertex as usize + 2) {

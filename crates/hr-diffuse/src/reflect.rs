@@ -370,6 +370,7 @@ impl<L: LightField> Solver<L> {
             let irradiance = new.unwrap_or(&self.exitant.irradiance)[leaf as usize];
             let diffuse = irradiance * element.reflectance * FRAC_1_PI;
             let arrived = Arrived { irradiance, diffuse, spread, negligible, error, shown };
+            // Outlines of senders show where leaves are looked at; what goes on to other elements is spread by how far away they are.
             if shown {
                 self.field.reflect(&light, NodeId(leaf), &path, arrived)
             } else {

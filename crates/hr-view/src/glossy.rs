@@ -57,7 +57,8 @@ pub(crate) fn carried<B: Basis>(solution: &Solution<GlossyField<B>>, leaf: NodeI
     solution.exitant.irradiance[leaf.index()] * albedo * FRAC_1_PI
 }
 
-/// The leaves whose distributions are shown around some vertices and their shares, some more than once. What lies below something is not seen.
+/// The leaves whose distributions are shown around some vertices and their shares, some more than once. What lies below something is
+/// not seen.
 pub(crate) fn shares<B: Basis>(
     solution: &Solution<GlossyField<B>>,
     corners: &[(u32, f32)],
@@ -66,9 +67,7 @@ pub(crate) fn shares<B: Basis>(
         let clusters = solution.faces.around(vertex);
         let around = if clusters.is_empty() { solution.vertices.leaves_around(vertex) } else { &[] };
         let leaves = around.iter().map(|&leaf| (leaf, solution.elements.exposed(leaf) / around.len() as f32));
-        let all = clusters.iter().map(|(_, weight)| weight).sum::<f32>();
-        let clusters = clusters.iter().map(move |&(leaf, weight)| (leaf, weight / all));
-        clusters.chain(leaves).map(move |(leaf, weight)| (leaf, weight * share))
+        clusters.iter().copied().chain(leaves).map(move |(leaf, part)| (leaf, part * share))
     })
 }
 
