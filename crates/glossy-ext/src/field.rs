@@ -8,7 +8,7 @@ use crate::basis::{Basis, Beyond, Known, Peak, Support};
 use crate::haar::{Haar, Refinement};
 use crate::outgoing::{Focus, Outgoing, SHOWN_COSINE};
 use crate::reflector::{Incident, Reflector, Ward};
-use crate::samples::{IlluminationSample, Place, SampleSet, arriving_in_parts, merge_close, merge_weak};
+use crate::samples::{IlluminationSample, Place, SampleSet, arriving_as, merge_close, merge_weak};
 use albedos::Albedos;
 use glam::Vec3;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
@@ -197,7 +197,7 @@ impl<B: Basis> GlossyField<B> {
         let arrive = |normal: Vec3, irradiance: Option<Rgb>| {
             let place = Place::along(center, normal, material.reflector.grain());
             let mut incident = Vec::new();
-            arriving_in_parts(hierarchy, leaf, path, &place, &mut incident);
+            arriving_as(hierarchy, (leaf, path), &place, true, &mut incident);
             if let Some(irradiance) = irradiance {
                 balance(&mut incident, irradiance);
             }

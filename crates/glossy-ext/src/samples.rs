@@ -97,7 +97,8 @@ impl Place {
 
 /// The union of the sample sets on the path from the root down to `leaf`, as they arrive at a place of it: pushed
 /// down without a copy in between. Direction, extent and irradiance are renewed for the place (the sender is known),
-/// and the cosine is applied to what ancestors without orientation received. Directions are in the place's frame.
+/// and the cosine is applied to what ancestors without orientation received. Directions are in the place's frame. Each sender
+/// is seen in the direction of its middle, however much of the view it takes up.
 pub fn arriving<H: Hierarchy>(
     hierarchy: &H,
     leaf: NodeId,
@@ -105,21 +106,11 @@ pub fn arriving<H: Hierarchy>(
     place: &Place,
     out: &mut Vec<Incident>,
 ) {
-    arrive_all(hierarchy, (leaf, path), place, false, out);
+    arriving_as(hierarchy, (leaf, path), place, false, out);
 }
 
-/// The same, each sender that takes up much of the view in parts that do not.
-pub fn arriving_in_parts<H: Hierarchy>(
-    hierarchy: &H,
-    leaf: NodeId,
-    path: &[&SampleSet],
-    place: &Place,
-    out: &mut Vec<Incident>,
-) {
-    arrive_all(hierarchy, (leaf, path), place, true, out);
-}
-
-fn arrive_all<H: Hierarchy>(
+/// The same, [wide](crate::wide) senders in parts if these count.
+pub(crate) fn arriving_as<H: Hierarchy>(
     hierarchy: &H,
     (leaf, path): (NodeId, &[&SampleSet]),
     place: &Place,

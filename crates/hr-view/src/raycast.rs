@@ -88,8 +88,10 @@ impl Met {
 struct Shared {
     /// Saves allocations.
     incident: Vec<Incident>,
-    /// What is seen in its middle.
-    middle: Option<Shaded>,
+    /// The ray through its middle, from the eye in unit space.
+    ray: (Vec3, Vec3),
+    /// What is seen there, once it is asked for.
+    middle: Option<Option<Shaded>>,
 }
 
 /// Glossy light toward a pixel of samples that arrive.
@@ -203,7 +205,8 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
         let (rays, seed) = (self.grid * self.grid, hash(x as u32, y as u32 ^ 0x6b43));
         let mut pixel = Pixel::default();
-        shared.middle = self.middle(eye, camera.direction(x as f64 + 0.5, y as f64 + 0.5).as_vec3(), shared);
+        shared.ray = (eye, camera.direction(x as f64 + 0.5, y as f64 + 0.5).as_vec3());
+        shared.middle = None;
         for i in 0..rays * (1 + rounds) {
             let sampler = Sampler::new(seed, i);
             let within = if i < rays {
@@ -221,10 +224,8 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     }
 
     /// The glossy light of the leaf in the middle of a pixel, where it is that of samples.
-    fn middle(&self, eye: Vec3, direction: Vec3, shared: &mut Shared) -> Option<Shaded> {
-        if self.mode != Mode::Samples {
-            return None;
-        }
+    fn middle(&self, shared: &mut Shared) -> Option<Shaded> {
+        let (eye, direction) = shared.ray;
         let hit = self.solution.scene.visibility.closest_except(eye, direction, START, f32::MAX, u32::MAX)?;
         let leaf =
             self.solution.leaf(&hit).filter(|_| self.scene.base_color(hit.surface, hit.uv.x, hit.uv.y).is_none())?;
@@ -351,13 +352,22 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             };
             return light + self.tracer.glossy(&met.hit, -met.away, pairs, &turns, &mut beyond);
         }
-        let shared_light = shared.middle.as_ref().filter(|middle| bounce == 0 && self.is_same(middle, met));
-        light + shared_light.map(|middle| middle.light).unwrap_or_else(|| self.by_samples(met, shared))
+        if bounce == 0 {
+            if shared.middle.is_none() {
+                shared.middle = Some(self.middle(shared));
+            }
+            if let Some(middle) = shared.middle.iter().flatten().find(|middle| self.is_same(middle, met)) {
+                return light + middle.light;
+            }
+        }
+        light + self.by_samples(met, shared)
     }
 
     /// Whether the glossy light in the middle of a pixel stands for that of a point.
     fn is_same(&self, middle: &Shaded, met: &Met) -> bool {
-        self.solution.faces.standing(met.leaf.0) == middle.cluster
+        let is_plain = Arc::ptr_eq(&met.reflector, &self.material(&met.hit).reflector);
+        is_plain
+            && self.solution.faces.standing(met.leaf.0) == middle.cluster
             && middle.at.distance(met.hit.point) <= SAME_PLACE * self.solution.elements.nodes[met.leaf.index()].radius
             && middle.seen.distance(glossy::mirrored(met.normal, met.away)) <= SAME_DIRECTION * middle.width
     }
