@@ -4,7 +4,8 @@ use crate::stability::answers::assert_sane;
 use glam::{DVec3, Vec3};
 use hr_diffuse::sampling::{hash, unit};
 use hr_diffuse::{
-    Budget, DiffuseMaterial, Light, LightKind, Progress, Rgb, SceneInput, Settings, Shape, SolveError, Solver, Surface,
+    Budget, DiffuseMaterial, Light, LightKind, Progress, Rgb, SceneInput, Settings, Shape, Solution, SolveError,
+    Solver, Surface,
 };
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -145,6 +146,17 @@ fn mended(mut input: SceneInput, settings: Settings) -> Option<(SceneInput, Solv
     }
 }
 
+/// What there is when a solver is done, or has been called often enough.
+fn ended(mut solver: Solver) -> Solution {
+    let mut calls = 0;
+    let mut watch = |_: &Progress| {
+        calls += 1;
+        if calls > MOST_CALLS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    solver.solve(&mut watch);
+    solver.finish(&mut watch)
+}
+
 /// What an error names can be left out, and then the rest is solved: all numbers finite, no negative light.
 #[test]
 fn random_scenes_are_refused_or_solved() {
@@ -155,14 +167,8 @@ fn random_scenes_are_refused_or_solved() {
         let memory = source.of(&[None, None, Some(0), Some(100_000), Some(u64::MAX)]);
         let time = source.of(&[None, None, Some(Duration::ZERO), Some(Duration::from_millis(20)), Some(Duration::MAX)]);
         let settings = Settings { budget: Budget { time, memory }, ..Settings::with_error(error) };
-        let Some((input, mut solver)) = mended(source.scene(), settings) else { continue };
-        let mut calls = 0;
-        let mut watch = |_: &Progress| {
-            calls += 1;
-            if calls > MOST_CALLS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        solver.solve(&mut watch);
-        let solution = solver.finish(&mut watch);
+        let Some((input, solver)) = mended(source.scene(), settings) else { continue };
+        let solution = ended(solver);
         assert_sane(&solution, &format!("case {case}, {input:?}"));
         solved += 1;
     }
@@ -181,14 +187,8 @@ fn random_scenes_do_not_make_light() {
         for material in &mut input.materials {
             material.reflectance *= 0.5;
         }
-        let Some((input, mut solver)) = mended(input, Settings::with_error(0.5)) else { continue };
-        let mut calls = 0;
-        let mut watch = |_: &Progress| {
-            calls += 1;
-            if calls > MOST_CALLS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        solver.solve(&mut watch);
-        let solution = solver.finish(&mut watch);
+        let Some((input, solver)) = mended(input, Settings::with_error(0.5)) else { continue };
+        let solution = ended(solver);
         let brightest = input.materials.iter().map(|m| m.exitance).fold(Rgb::ZERO, Rgb::max);
         for radiosity in &solution.exitant.radiosity {
             let most = brightest / (1.0 - 0.5 * 1.1) * 1.01;
