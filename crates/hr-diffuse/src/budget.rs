@@ -59,8 +59,8 @@ impl Account {
 
     /// Bytes that so many nodes and links take in the solver, without what the extension keeps elsewhere.
     fn bytes<L: LightField>(&self, nodes: u64, links: u64) -> u64 {
-        // Radiosity, range, irradiance and its last value, directional; facing; whose light it is, gain, peak, brightest.
-        let exitant = 6 * size_of::<Rgb>() + size_of::<Facing>() + 4 * size_of::<u32>();
+        // Radiosity, range, irradiance and its last value, directional; facing; whose light it is, gain, peak, brightest, adaptation.
+        let exitant = 6 * size_of::<Rgb>() + size_of::<Facing>() + 5 * size_of::<u32>();
         let node =
             size_of::<Element>() + exitant + gather::NODE_BYTES + size_of::<L::Incident>() + size_of::<L::Exitant>();
         let link = size_of::<Link>() + gather::LINK_BYTES;

@@ -4,9 +4,12 @@
 //! small the leaves are, as teeth of light. So what is shown of a leaf is cut along the lines in which other polygons meet it, and
 //! each part gathers at vertices of its own (discontinuities of degree 0: P. Heckbert, "Discontinuity meshing for radiosity",
 //! Eurographics Workshop on Rendering 1992). Light travels between whole leaves as before.
+//!
+//! The floors of two rooms may be two polygons that end at the wall between them: there nothing is cut, but leaves on one side of the
+//! wall share no vertices with those on the other.
 
 use crate::geometry::Geometry;
-use crate::hierarchy::{Elements, SceneData};
+use crate::hierarchy::{Element, Elements, SceneData};
 use crate::sealed::outward;
 use crate::threads::prelude::*;
 use crate::vertices::{Corner, INSET, Layout, Outline, Vertices};
@@ -36,6 +39,8 @@ const BEYOND: f32 = 0.05;
 struct Contact {
     normal: Vec3,
     height: f32,
+    /// Whether all of the leaf's surface is on one side of it.
+    beside: bool,
 }
 
 impl Contact {
@@ -53,11 +58,12 @@ pub(crate) struct Contacts {
 
 impl Contacts {
     /// Finds what meets each leaf.
-    pub(crate) fn new(scene: &SceneData, elements: &Elements) -> Self {
-        let leaves: Vec<u32> = elements.patch_leaves().collect();
-        let look = |&leaf: &u32| (leaf, contacts(scene, elements, leaf));
-        let found: Vec<_> = leaves.par_iter().with_min_len(64).map(look).collect();
-        Self { of: found.into_iter().filter(|(_, contacts)| !contacts.is_empty()).collect() }
+    pub(crate) fn new(scene: &SceneData, elements: &Elements, layout: &Layout) -> Self {
+        let look = |(leaf, _): &(u32, Outline)| contacts(scene, elements, *leaf);
+        let mut found: Vec<_> = layout.parts.par_iter().with_min_len(64).map(look).collect();
+        part(elements, layout, &mut found);
+        let of = layout.parts.iter().map(|(leaf, _)| *leaf).zip(found);
+        Self { of: of.filter(|(_, contacts)| !contacts.is_empty()).collect() }
     }
 
     /// Cuts leaves along the lines.
@@ -118,6 +124,44 @@ impl Contacts {
     }
 }
 
+/// Of what leaves lie beside, keeps what parts them from others: leaves on its other side that share a vertex with them. By leaf of the
+/// layout.
+fn part(elements: &Elements, layout: &Layout, found: &mut [SmallVec<[Contact; MOST_LINES]>]) {
+    let positions = &layout.vertices.positions;
+    let is_on = |leaf: u32, contact: &Contact, corner: &Corner| {
+        let near = ON * elements.nodes[leaf as usize].radius;
+        contact.above(positions[corner.vertex as usize]).abs() <= near
+    };
+    let mut asked = vec![false; positions.len()];
+    for ((leaf, outline), contacts) in layout.parts.iter().zip(&*found) {
+        for contact in contacts.iter().filter(|contact| contact.beside) {
+            let on_line = outline.iter().filter(|corner| is_on(*leaf, contact, corner));
+            on_line.for_each(|corner| asked[corner.vertex as usize] = true);
+        }
+    }
+    let asking = |(leaf, outline): &(u32, Outline)| {
+        let vertices: SmallVec<[u32; 12]> =
+            outline.iter().map(|corner| corner.vertex).filter(|&vertex| asked[vertex as usize]).collect();
+        let leaf = *leaf;
+        vertices.into_iter().map(move |vertex| (vertex, leaf))
+    };
+    let mut around: Vec<(u32, u32)> = layout.parts.iter().flat_map(asking).collect();
+    around.sort_unstable();
+    for ((leaf, outline), contacts) in layout.parts.iter().zip(found) {
+        let middle = |leaf: u32| elements.nodes[leaf as usize].center;
+        let parts = |contact: &Contact, vertex: u32| {
+            let leaves = &around[around.partition_point(|of| of.0 < vertex)..];
+            let mine = contact.above(middle(*leaf));
+            let mut leaves = leaves.iter().take_while(|of| of.0 == vertex);
+            leaves.any(|&(_, other)| contact.above(middle(other)) * mine < 0.0)
+        };
+        contacts.retain(|contact| {
+            let mut on_line = outline.iter().filter(|corner| is_on(*leaf, contact, corner));
+            !contact.beside || on_line.any(|corner| parts(contact, corner.vertex))
+        });
+    }
+}
+
 /// What meets a leaf.
 fn contacts(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Contact; MOST_LINES]> {
     let element = &elements.nodes[leaf as usize];
@@ -137,14 +181,14 @@ fn contacts(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Cont
         if other != element.source
             && let Some(contact) = contact(surface, geometry, normal)
             && let Some(line) = section(surface, normal, height + gap)
-            && length_within(line, &outline, normal, element.center) > LONG * element.radius
+            && length_within(line, (&outline, contact.beside), normal, element) > LONG * element.radius
         {
             found.push((other, contact));
         }
         false
     });
     // Two triangles of one polygon are in the same plane.
-    found.sort_by_key(|(other, _)| *other);
+    found.sort_by_key(|(other, contact)| (contact.beside, *other));
     let mut contacts: SmallVec<[Contact; MOST_LINES]> = SmallVec::new();
     for (_, contact) in found {
         let same = |other: &Contact| {
@@ -158,17 +202,18 @@ fn contacts(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Cont
     contacts
 }
 
-/// The plane of a polygon that is not parallel to one with a normal and does not lie beside it, as walls beside floors do.
+/// The plane of a polygon that is not parallel to one with a normal, which may lie beside it, as walls beside floors do.
 fn contact(surface: &Geometry, geometry: &Geometry, normal: Vec3) -> Option<Contact> {
     let plane = surface.is_polygon().then(|| outward(surface, 0))?;
     let [low, high] = geometry.heights(plane)?;
     let height = surface.point(Vec2::ZERO).dot(plane);
     let beside = ON * (high - low);
-    if plane.dot(normal).abs() > PARALLEL || low > height - beside || high < height + beside {
+    if plane.dot(normal).abs() > PARALLEL {
         return None;
     }
+    let beside = low > height - beside || high < height + beside;
     let sign = plane.to_array().into_iter().find(|c| c.abs() > 1e-3).map_or(1.0, f32::signum);
-    Some(Contact { normal: plane * sign, height: height * sign })
+    Some(Contact { normal: plane * sign, height: height * sign, beside })
 }
 
 /// Where a polygon that reaches down to a height along a direction, or below it, is cut by the plane there.
@@ -185,14 +230,15 @@ fn section(surface: &Geometry, direction: Vec3, height: f32) -> Option<[Vec3; 2]
     ends.get(..2).map(|ends| [ends[0], ends[1]])
 }
 
-/// How much of a line lies within a convex outline around a middle, seen along its normal.
-fn length_within([from, to]: [Vec3; 2], outline: &[Vec3], normal: Vec3, middle: Vec3) -> f32 {
+/// How much of a line lies within the convex outline of an element, or on its edge where it may be `beside` it, seen along its normal.
+fn length_within([from, to]: [Vec3; 2], (outline, beside): (&[Vec3], bool), normal: Vec3, element: &Element) -> f32 {
     let (mut first, mut last) = (0.0_f32, 1.0_f32);
     for (i, &a) in outline.iter().enumerate() {
         let b = outline[(i + 1) % outline.len()];
         let inward = normal.cross(b - a);
-        let inward = if inward.dot(middle - a) < 0.0 { -inward } else { inward };
-        let [start, end] = [from, to].map(|x| inward.dot(x - a));
+        let inward = if inward.dot(element.center - a) < 0.0 { -inward } else { inward };
+        let slack = if beside { ON * element.radius * inward.length() } else { 0.0 };
+        let [start, end] = [from, to].map(|x| inward.dot(x - a) + slack);
         match (start < 0.0, end < 0.0) {
             (true, true) => return 0.0,
             (true, false) => first = first.max(start / (start - end)),

@@ -185,6 +185,19 @@ impl Gather {
         self.push.places.nodes.iter().copied().zip(diffuse).collect()
     }
 
+    /// By place, the sum of what `of` says of senders with extent, times their form factors.
+    pub(crate) fn weigh<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        links: &Links,
+        of: impl Fn(u32) -> f32 + Sync,
+    ) -> Vec<f32> {
+        self.by_place(light, links, |link, spread| match light.element(link.sender).kind {
+            Kind::Light => 0.0,
+            Kind::Cluster | Kind::Front | Kind::Back => link.factor * visible(link, spread) * of(link.sender),
+        })
+    }
+
     /// By place, what links bring that carry what `of` says.
     fn by_place<L: LightField>(
         &self,

@@ -87,11 +87,6 @@ pub struct Element {
 }
 
 impl Element {
-    /// What an error of its irradiance counts, among surfaces of so much area in all.
-    pub(crate) fn weight(&self, area: f32) -> f32 {
-        self.importance * (self.area / area).sqrt()
-    }
-
     /// Whether all of the node lies in one plane, so that irradiance has one cosine.
     #[must_use]
     pub fn is_flat(&self) -> bool {

@@ -221,6 +221,7 @@ impl Exitant {
         out.put(&self.reflected_as)?;
         out.put(&self.gain)?;
         out.put(&self.peak)?;
+        out.put(&self.adaptation)?;
         out.put(&self.senders.ranges)?;
         out.put(&self.senders.standing)
     }
@@ -237,6 +238,7 @@ impl Exitant {
             reflected_as: from.take("nodes that stand for others")?,
             gain: from.take_finite("gains")?,
             peak: from.take_finite("peaks")?,
+            adaptation: from.take_finite("what errors count")?,
             senders: Senders { ranges: from.take(SENDERS)?, standing: from.take(SENDERS)? },
         };
         let lengths = [
@@ -249,6 +251,7 @@ impl Exitant {
             exitant.reflected_as.len(),
             exitant.gain.len(),
             exitant.peak.len(),
+            exitant.adaptation.len(),
         ];
         fits(lengths.iter().all(|&length| length == nodes), "arrays by node")?;
         fits(exitant.reflected_as.iter().all(|&node| (node as usize) < nodes), "nodes that stand for others")?;

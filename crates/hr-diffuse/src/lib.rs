@@ -10,6 +10,7 @@
 //! `parallel` (default): all cores, by rayon, in the pool of whoever calls. Without it there is one thread, and the answer
 //! is the same, bit by bit.
 
+mod adaptation;
 pub mod budget;
 mod calibrate;
 mod columns;

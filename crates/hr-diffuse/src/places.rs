@@ -130,7 +130,7 @@ fn sheet(elements: &Elements, sheets: &[Option<Sheet>], linked: &[bool], node: u
 /// brings much.
 fn has_edge<L: LightField>(light: Light<'_, L>, links: &Links, edges: Edges<'_>, place: u32) -> (bool, u64) {
     let element = light.element(place);
-    let weight = element.weight(light.elements.measure());
+    let weight = light.weight(place);
     let (mut node, mut shot) = (place, 0);
     loop {
         for at in links.range(node) {

@@ -110,6 +110,7 @@ impl<L: LightField> Solver<L> {
         make_room(&mut exitant.directional, || Rgb::ZERO);
         make_room(&mut exitant.peak, || 0.0);
         make_room(&mut exitant.gain, || 1.0);
+        make_room(&mut exitant.adaptation, || 1.0);
         exitant.reflected_as.iter_mut().for_each(|node| *node = grafted(*node));
         make_room(&mut exitant.reflected_as, || 0);
         exitant.reflected_as[GRAFT as usize] = GRAFT;
@@ -132,6 +133,7 @@ impl<L: LightField> Solver<L> {
         exitant.directional.resize(count, Rgb::ZERO);
         exitant.peak.resize(count, 0.0);
         exitant.gain.resize(count, 1.0);
+        exitant.adaptation.resize(count, 1.0);
         self.incident.resize_with(count, L::Incident::default);
         self.reflected.resize_with(count, L::Exitant::default);
         let mut links = self.links.take();

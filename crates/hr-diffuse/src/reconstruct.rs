@@ -57,8 +57,8 @@ pub(crate) fn reconstruct<L: LightField>(
     error: f32,
     watch: &mut dyn FnMut(f32) -> ControlFlow<()>,
 ) -> (Vertices, Cost) {
-    let contacts = Contacts::new(light.scene, light.elements);
     let mut layout = outlines(light.scene, light.elements);
+    let contacts = Contacts::new(light.scene, light.elements, &layout);
     contacts.cut(light.elements, &mut layout);
     let mut vertices = layout.fans(light.scene, light.elements);
     let places = contacts.places(light.elements, &vertices);

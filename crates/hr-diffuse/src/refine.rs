@@ -40,13 +40,17 @@ const DIRECTIONAL_SHARE: f32 = 0.05;
 /// Leaves of surfaces that reflect directional light have normals within this angle (radians) of their middle.
 const MOST_BENT: f32 = 0.6;
 /// Mean cosine of a cluster's normals that is told from none: of what is seen edge-on.
-const LEAST_COSINE: f32 = 0.05;
+pub(crate) const LEAST_COSINE: f32 = 0.05;
 /// Share of a link's tolerance that its factor may be wrong by, …
 const FACTOR_SHARE: f32 = 0.05;
 /// … least and most that may be relative to the factor, …
 const FACTOR_ERROR: [f32; 2] = [0.02, 0.1];
 /// … and points of the receiver that it is worth.
 const FACTOR_POINTS: u32 = 16;
+/// Clusters that overlap are divided, but for those below this many times the radius of the smallest elements, …
+const OVERLAPPING: f32 = 80.0;
+/// … and but for light of which there can be no more than this share of what the receiver has.
+const NOTICED: f32 = 0.1;
 /// Pairs that a thread decides upon between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 128;
 /// Segments per link: first a few, then as many as its light is worth.
@@ -73,14 +77,12 @@ pub(crate) struct Pair {
 /// When is a link good enough?
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tolerance {
-    /// Irradiance × importance × √(receiver's share of `area`) that a link may be wrong by.
+    /// Irradiance × [what it counts](Light::weight) that a link may be wrong by.
     pub(crate) error: f32,
     /// The same for light that is there on one side of a shadow's edge and not on the other.
     pub(crate) shadow: f32,
     /// Whether links that are there already are looked at for it, too.
     pub(crate) kept_too: bool,
-    /// That of all surfaces, or of those of [one of several rooms](crate::rooms).
-    pub(crate) area: f32,
     /// Radius in unit space below which elements are not split.
     pub(crate) smallest: f32,
     /// Pairs that need no link.
@@ -294,6 +296,7 @@ impl<L: LightField> MutableLight<'_, L> {
             exitant.reflected_as.push(exitant.reflected_as[parent]);
             exitant.peak.push(0.0);
             exitant.gain.push(exitant.gain[parent]);
+            exitant.adaptation.push(exitant.adaptation[parent]);
             self.reflected.push(L::Exitant::default());
         }
     }
@@ -405,7 +408,7 @@ fn decide<L: LightField>(
     else {
         return Verdict::Facing;
     };
-    let weight = r.weight(tolerance.area);
+    let weight = light.weight(pair.receiver);
     let interval = interval(light, pair, &bounds, tolerance.error / weight);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
@@ -423,6 +426,17 @@ fn decide<L: LightField>(
     let bent = r.active && r.is_patch() && r.normals.angle() > MOST_BENT;
     if bent && weight * interval.most > tolerance.error && can_split(r, tolerance) && !stopped {
         return Verdict::SplitReceiver;
+    }
+    // Middles of large clusters that overlap tell nothing of what one brings to the parts of the other; in a dim corner it may be all.
+    let overlap = !(r.is_patch() && s.is_patch())
+        && r.center.distance(s.center) < r.radius + s.radius
+        && r.radius.max(s.radius) > OVERLAPPING * tolerance.smallest;
+    let noticed = NOTICED * light.exitant.irradiance[pair.receiver as usize].max_element();
+    if overlap
+        && interval.most > noticed
+        && let Some(verdict) = split(choose(light, pair, tolerance, false))
+    {
+        return verdict;
     }
     if by_bounds > tolerance.error {
         let prefer_sender = RADIOSITY_SHARE * interval.radiosity > interval.geometry;
@@ -510,7 +524,7 @@ fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Toleranc
         return Verdict::SplitBoth;
     }
     // The inside of a curved surface: split while the light that would be lost matters.
-    let weight = element.weight(tolerance.area);
+    let weight = light.weight(node);
     let at_stake = light.emitted_most(node) * weight;
     let splittable = element.is_patch() && element.radius > tolerance.smallest;
     if at_stake > tolerance.error && splittable && !stopped { Verdict::SplitBoth } else { Verdict::Facing }

@@ -101,7 +101,7 @@ fn is_torn<L: LightField>(
     {
         return (false, 0);
     }
-    let weight = element.weight(tolerance.area);
+    let weight = light.weight(leaf);
     let places = || outline.iter().map(|corner| corner.uv).chain([geometry.middle(element.domain)]);
     let (mut node, mut rays) = (leaf, 0);
     loop {

@@ -1,5 +1,6 @@
 //! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
 
+use crate::adaptation::adaptation;
 use crate::budget::{Account, Budget, Spent};
 use crate::columns::{FREELY, STRICTLY};
 use crate::convergence::Convergence;
@@ -216,6 +217,7 @@ impl<L: LightField> Solver<L> {
             reflected_as: (0..count as u32).collect(),
             peak: vec![0.0; count],
             gain: vec![1.0; count],
+            adaptation: vec![1.0; count],
             senders: Senders::default(),
         };
         let incident = std::iter::repeat_with(L::Incident::default).take(count).collect();
@@ -542,6 +544,10 @@ impl<L: LightField> Solver<L> {
     /// Refines all links to a tolerance.
     fn refine(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let start = Instant::now();
+        // Where light has come by other links what was found then still holds.
+        if self.gather.is_for(&self.links) {
+            self.exitant.adaptation = adaptation(self.light(), &self.gather, &self.links);
+        }
         let tolerance = Tolerance {
             error: self.link_error(pass.tolerance),
             shadow: if pass.closely || self.edges_known {
@@ -550,7 +556,6 @@ impl<L: LightField> Solver<L> {
                 f32::INFINITY
             },
             kept_too: !self.edges_known,
-            area: self.elements.measure(),
             smallest: SMALLEST_SHARE * pass.tolerance.sqrt() * self.elements.rooms.size,
             skips: self.skips,
         };
@@ -770,7 +775,7 @@ impl<L: LightField> Solver<L> {
 
     /// What an error of the irradiance of a receiver counts.
     pub(crate) fn weight(&self, receiver: u32) -> f32 {
-        self.elements.nodes[receiver as usize].weight(self.elements.measure())
+        self.light().weight(receiver)
     }
 
     /// Mean irradiance of the surfaces that any light reaches and that reflect any; before there is any, that which the emitted power

@@ -46,6 +46,8 @@ pub struct Exitant {
     pub gain: Vec<f32>,
     /// Most radiance (max channel, any direction) of the leaves that stand for a node.
     pub peak: Vec<f32>,
+    /// How much more errors count than where it is bright, ≥ 1: see [adaptation](crate::adaptation).
+    pub(crate) adaptation: Vec<f32>,
 }
 
 /// Read access to a (partial) solution: geometry, hierarchy and exitant light.
@@ -74,6 +76,13 @@ impl<L: LightField> Copy for Light<'_, L> {}
 impl<L: LightField> Light<'_, L> {
     pub(crate) fn element(&self, node: u32) -> &Element {
         &self.elements.nodes[node as usize]
+    }
+
+    /// What an error of a receiver's irradiance counts.
+    pub(crate) fn weight(&self, receiver: u32) -> f32 {
+        let element = self.element(receiver);
+        let share = (element.area / self.elements.measure()).sqrt();
+        element.importance * share * self.exitant.adaptation[receiver as usize]
     }
 
     /// What a sender emits in a direction away from it, in the units that [`Link::factor`](crate::links::Link)

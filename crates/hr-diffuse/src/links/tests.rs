@@ -1,4 +1,5 @@
 use crate::geometry::tests::surface;
+use crate::refine::LEAST_COSINE;
 use crate::{Budget, DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solver, Surface};
 use glam::DVec3;
 use proptest::strategy::{Strategy, ValueTree};
@@ -29,7 +30,7 @@ fn surfaces(runner: &mut TestRunner, count: usize) -> Vec<Surface> {
     (0..count).map(random).collect()
 }
 
-/// Factors are shares: of what a receiver's point sees, 0…1, and of what leaves the sender; and what is hidden is no more
+/// Factors are shares: of what a receiver's point sees, 0…1 of what it shows, and of what leaves the sender; and what is hidden is no more
 /// than there would be.
 #[test]
 fn links_carry_no_more_than_there_is() {
@@ -39,7 +40,10 @@ fn links_carry_no_more_than_there_is() {
         let Some(solver) = solve(surfaces(&mut runner, 5), 0.2) else { continue };
         for link in solver.links.all() {
             let [receiver, sender] = [link.receiver, link.sender].map(|node| &solver.elements.nodes[node as usize]);
-            assert!((0.0..=1.0).contains(&link.factor), "scene {scene}: {link:?}");
+            // What a cluster sends is told by the mean cosine of its normals, however much of it is seen.
+            let away = -solver.light().direction_to(receiver.center, link.sender);
+            let shown = if sender.is_patch() { 1.0 } else { sender.mean_cosine(away).max(LEAST_COSINE) };
+            assert!((0.0..=1.0 + ROUNDING).contains(&(link.factor * shown)), "scene {scene}: {link:?}");
             assert!(link.visibility.abs() <= 1.0, "scene {scene}: {link:?}");
             if receiver.is_flat() && sender.is_patch() {
                 let most = receiver.area.min(sender.area);

@@ -2,6 +2,7 @@
 //!
 //! One program for all of them: the solver is compiled anew into each.
 
+mod adaptation;
 mod analytic;
 mod balance;
 mod budget;
