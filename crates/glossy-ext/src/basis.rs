@@ -13,6 +13,7 @@ pub(crate) mod half;
 mod harmonics;
 mod known;
 mod non_adaptive;
+mod sum;
 #[cfg(test)]
 mod tests;
 pub(crate) mod triangle;
@@ -21,6 +22,7 @@ pub use harmonics::{Harmonics, Order, Window};
 pub(crate) use known::Sampler;
 pub use known::{Beyond, Known, Peak, Projected, Support};
 pub use non_adaptive::{Level, NonAdaptive};
+pub use sum::Sum;
 
 use crate::Rgb;
 use glam::Vec3;
@@ -39,6 +41,14 @@ pub trait Basis: Clone + Debug + Default + Send + Sync {
     ///
     /// Depends on nothing but the arguments: the same function gives the same distribution, bit by bit.
     fn project(settings: &Self::Settings, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected<Self>;
+
+    /// The same of a sum of terms. Where a basis adapts, terms that are smooth around some directions are interpolated between these
+    /// rather than evaluated, if that changes much less than the settings let be wrong.
+    fn project_sum(settings: &Self::Settings, known: &Known<'_>, sum: &impl Sum) -> Projected<Self> {
+        let count = sum.terms().len();
+        let projected = Self::project(settings, known, |direction| sum.at(direction));
+        Projected { terms: projected.evaluations * count, ..projected }
+    }
 
     /// The value in a direction, which need not have unit length. Zero for a direction that is zero or not finite.
     fn eval(&self, direction: Vec3) -> Rgb;

@@ -4,7 +4,7 @@ mod albedos;
 mod around;
 
 use crate::Rgb;
-use crate::basis::{Basis, Beyond, Known, Peak, Support};
+use crate::basis::{Basis, Beyond, Known, Peak, Sum, Support};
 use crate::haar::{Haar, Refinement};
 use crate::outgoing::{Focus, Outgoing, SHOWN_COSINE};
 use crate::reflector::{Incident, Reflector, Ward};
@@ -12,6 +12,7 @@ use crate::samples::{IlluminationSample, Place, SampleSet, arriving_as, merge_cl
 use albedos::Albedos;
 use glam::Vec3;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
+use std::cell::Cell;
 use std::f32::consts::FRAC_PI_2;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -73,20 +74,23 @@ pub struct Counters {
     samples: AtomicU64,
     clamped: AtomicU64,
     spared: AtomicU64,
+    interpolated: AtomicU64,
 }
 
 impl Counters {
     /// All of them, to be kept.
-    pub(crate) fn counts(&self) -> [u64; 4] {
-        [&self.evaluations, &self.samples, &self.clamped, &self.spared].map(|counter| counter.load(Ordering::Relaxed))
+    pub(crate) fn counts(&self) -> [u64; 5] {
+        [&self.evaluations, &self.samples, &self.clamped, &self.spared, &self.interpolated]
+            .map(|counter| counter.load(Ordering::Relaxed))
     }
 
     /// Takes over those of a solution that was kept.
-    pub(crate) fn take_over(&self, [evaluations, samples, clamped, spared]: [u64; 4]) {
+    pub(crate) fn take_over(&self, [evaluations, samples, clamped, spared, interpolated]: [u64; 5]) {
         self.evaluations.store(evaluations, Ordering::Relaxed);
         self.samples.store(samples, Ordering::Relaxed);
         self.clamped.store(clamped, Ordering::Relaxed);
         self.spared.store(spared, Ordering::Relaxed);
+        self.interpolated.store(interpolated, Ordering::Relaxed);
     }
 
     /// BRDF evaluations so far: one per sample and direction.
@@ -106,6 +110,13 @@ impl Counters {
     #[must_use]
     pub fn negligible_detail(&self) -> u64 {
         self.spared.load(Ordering::Relaxed)
+    }
+
+    /// Samples that were not reflected to a direction since what they make there is known from directions around it: BRDF evaluations
+    /// that were skipped.
+    #[must_use]
+    pub fn interpolated(&self) -> u64 {
+        self.interpolated.load(Ordering::Relaxed)
     }
 
     /// How often a reflector did what none can, and was overruled: radiances that were not finite, which became 0, or
@@ -227,7 +238,7 @@ impl<B: Basis> GlossyField<B> {
         let (least, negligible) = (-arrived.diffuse, arrived.negligible);
         // What goes on to other leaves is spread by how far away they are; only who looks at a highlight sees its edge.
         let error = if arrived.shown { arrived.error } else { 1.0 };
-        Some(Reflection { material, place, incident, focus, narrowest, flat, around, least, negligible, error })
+        Some(Reflection { material, place, incident, focus, width, narrowest, flat, around, least, negligible, error })
     }
 
     /// Represents what a leaf reflects in the basis.
@@ -247,18 +258,15 @@ impl<B: Basis> GlossyField<B> {
             negligible: reflection.negligible,
             error: reflection.error,
         };
-        let mut overruled = 0;
-        let projected = B::project(&self.settings, &known, |direction| {
-            let (light, is_clamped) = reflection.clamped(direction);
-            overruled += u64::from(is_clamped);
-            light
-        });
+        let lobes = Lobes { reflection, overruled: Cell::new(0) };
+        let projected = B::project_sum(&self.settings, &known, &lobes);
         let count = reflection.incident.len() as u64;
-        evaluations += projected.evaluations;
-        self.counters.evaluations.fetch_add(evaluations as u64 * count, Ordering::Relaxed);
+        let evaluations = evaluations as u64 * count + projected.terms as u64;
+        self.counters.evaluations.fetch_add(evaluations, Ordering::Relaxed);
+        self.counters.interpolated.fetch_add(projected.interpolated as u64, Ordering::Relaxed);
         self.counters.spared.fetch_add(projected.spared as u64, Ordering::Relaxed);
         self.counters.samples.fetch_add(count, Ordering::Relaxed);
-        self.counters.clamped.fetch_add(overruled + projected.not_finite as u64, Ordering::Relaxed);
+        self.counters.clamped.fetch_add(lobes.overruled.get() + projected.not_finite as u64, Ordering::Relaxed);
         projected.distribution
     }
 
@@ -330,6 +338,8 @@ pub struct Reflection<'a> {
     place: Place,
     incident: Vec<Incident>,
     focus: Focus,
+    /// Of the lobe (radians).
+    width: f32,
     /// Detail finer than this (radians) is lost.
     narrowest: f32,
     /// Whether it is radiance rather than intensity per area.
@@ -367,23 +377,28 @@ impl Reflection<'_> {
     /// are widened to what transport resolves. Not finite where the reflector says so.
     #[must_use]
     pub fn toward(&self, direction: Vec3) -> Rgb {
-        let (light, _) = self.clamped(direction);
+        let (light, _) = self.clamped(direction, self.add_up(&self.incident, direction));
         light
     }
 
-    /// The same, and whether the reflector had to be overruled.
-    fn clamped(&self, direction: Vec3) -> (Rgb, bool) {
+    /// What the reflector makes of samples toward a unit direction.
+    fn add_up(&self, incident: &[Incident], direction: Vec3) -> Rgb {
         let outgoing = self.place.local(direction);
-        let reflected = if self.around {
-            around::reflect(&self.incident, outgoing, |incident, outgoing| self.material.reflect(incident, outgoing))
+        if self.around {
+            around::reflect(incident, outgoing, |incident, outgoing| self.material.reflect(incident, outgoing))
         } else {
-            self.material.reflect(&self.incident, outgoing)
-        };
+            self.material.reflect(incident, outgoing)
+        }
+    }
+
+    /// What the leaf sends in a unit direction if the reflector makes this of all samples, and whether it had to be overruled.
+    fn clamped(&self, direction: Vec3, reflected: Rgb) -> (Rgb, bool) {
         // What is not finite the projection itself replaces and counts.
         let radiance = if reflected.is_finite() { reflected.max(self.least) } else { reflected };
         let is_clamped = (radiance - reflected).cmpgt(CLAMPED * radiance.abs()).any();
         let least = if self.around { SHOWN_COSINE } else { 0.0 };
-        (if self.flat { radiance } else { radiance * outgoing.z.max(least) }, is_clamped)
+        let cosine = self.place.normal().dot(direction).max(least);
+        (if self.flat { radiance } else { radiance * cosine }, is_clamped)
     }
 
     /// Scales a distribution to the power that its samples make, however coarse it is, and to no more than the leaf can reflect of an
@@ -411,6 +426,37 @@ impl Reflection<'_> {
             cone: Cone { axis: self.place.normal(), cos_angle: 1e-3 },
             beyond: if self.flat { Beyond::Continued } else { Beyond::Zero },
         }
+    }
+}
+
+/// The lobes that samples make, as a sum to be projected.
+struct Lobes<'a> {
+    reflection: &'a Reflection<'a>,
+    /// How often the reflector was.
+    overruled: Cell<u64>,
+}
+
+impl Sum for Lobes<'_> {
+    type Term = Incident;
+
+    fn terms(&self) -> &[Incident] {
+        &self.reflection.incident
+    }
+
+    fn peak(&self, sample: &Incident) -> Peak {
+        let Reflection { place, width, .. } = self.reflection;
+        let mirrored = Vec3::new(-sample.direction.x, -sample.direction.y, sample.direction.z);
+        Peak { direction: place.frame * mirrored, width: width.max(sample.extent) }
+    }
+
+    fn add_up(&self, samples: &[Incident], direction: Vec3) -> Rgb {
+        self.reflection.add_up(samples, direction)
+    }
+
+    fn value(&self, direction: Vec3, sum: Rgb) -> Rgb {
+        let (light, is_clamped) = self.reflection.clamped(direction, sum);
+        self.overruled.set(self.overruled.get() + u64::from(is_clamped));
+        light
     }
 }
 

@@ -47,10 +47,11 @@ mod keep;
 mod mesh;
 mod outline;
 mod project;
+mod terms;
 #[cfg(test)]
 mod tests;
 
-pub use crate::basis::{Beyond, Known, Peak, Projected, Support};
+pub use crate::basis::{Beyond, Known, Peak, Projected, Sum, Support};
 pub use outline::Outline;
 pub use project::{Refinement, Refiner};
 
@@ -450,6 +451,10 @@ impl Basis for Haar {
 
     fn project(settings: &Refinement, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected<Self> {
         Self::project(settings, known, f)
+    }
+
+    fn project_sum(settings: &Refinement, known: &Known<'_>, sum: &impl Sum) -> Projected<Self> {
+        Self::project_sum(settings, known, sum)
     }
 
     #[inline]

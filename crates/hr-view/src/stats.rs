@@ -73,6 +73,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "joined_leaves": skipped.joined_leaves,
             "shot_links": skipped.shot_links,
             "negligible_detail": solution.field.counters().negligible_detail(),
+            "interpolated_samples": solution.field.counters().interpolated(),
         },
         "stopped": stats.stopped,
         "budget_spent": stats.spent.map(|spent| match spent {

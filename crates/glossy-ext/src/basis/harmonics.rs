@@ -189,11 +189,11 @@ impl Basis for Harmonics {
 
     /// By quadrature on circles of latitude: Gauss–Legendre by height, evenly around. There are twice as many as the
     /// harmonics themselves need, more where peaks are narrower.
-    fn project(settings: &Order, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected<Self> {
+    fn project(settings: &Order, known: &Known<'_>, mut f: impl FnMut(Vec3) -> Rgb) -> Projected<Self> {
         let last = settings.last.min(Order::MAX);
         let narrowest = known.peaks.iter().map(|p| p.width).filter(|w| *w > 0.0).fold(PI, f32::min);
         let circles = (2 * (usize::from(last) + 1)).max((2.0 * PI / narrowest) as usize).min(MOST_CIRCLES);
-        let mut sampler = Sampler::new(f, known.support.as_ref());
+        let mut sampler = Sampler::new(known.support.as_ref());
         let mut sums = vec![DVec3::ZERO; (usize::from(last) + 1).pow(2)];
         for (z, weight) in gauss_legendre(circles) {
             let radius = (1.0 - z * z).sqrt();
@@ -201,7 +201,7 @@ impl Basis for Harmonics {
             for k in 0..around {
                 let turn = Vec2::from_angle(TAU * (k as f32 + 0.5) / around as f32) * radius as f32;
                 let direction = turn.extend(z as f32);
-                let value = sampler.at(direction).as_dvec3() * (weight * std::f64::consts::TAU / around as f64);
+                let value = sampler.at(direction, &mut f).as_dvec3() * (weight * std::f64::consts::TAU / around as f64);
                 if value != DVec3::ZERO {
                     harmonics(last, direction, |index, y| sums[index] += value * f64::from(y));
                 }

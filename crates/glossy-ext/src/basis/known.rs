@@ -72,6 +72,10 @@ pub struct Projected<B> {
     pub distribution: B,
     /// How often the function was evaluated.
     pub evaluations: usize,
+    /// How often terms of a sum were evaluated, …
+    pub terms: usize,
+    /// … and how often they were not, since they were known by interpolation.
+    pub interpolated: usize,
     /// How many of its values were infinite or not a number, and were replaced by 0.
     pub not_finite: usize,
     /// Triangles that were left as they are only because what differs over them is negligible.
@@ -81,8 +85,7 @@ pub struct Projected<B> {
 }
 
 /// The function, called only where it should be.
-pub(crate) struct Sampler<'a, F> {
-    f: F,
+pub(crate) struct Sampler<'a> {
     support: Option<&'a Support>,
     evaluations: usize,
     not_finite: usize,
@@ -90,9 +93,9 @@ pub(crate) struct Sampler<'a, F> {
     pub(crate) largest: f32,
 }
 
-impl<'a, F: FnMut(Vec3) -> Rgb> Sampler<'a, F> {
-    pub(crate) fn new(f: F, support: Option<&'a Support>) -> Self {
-        Self { f, support, evaluations: 0, not_finite: 0, largest: 0.0 }
+impl<'a> Sampler<'a> {
+    pub(crate) fn new(support: Option<&'a Support>) -> Self {
+        Self { support, evaluations: 0, not_finite: 0, largest: 0.0 }
     }
 
     pub(crate) fn is_inside(&self, position: Vec3) -> bool {
@@ -102,11 +105,19 @@ impl<'a, F: FnMut(Vec3) -> Rgb> Sampler<'a, F> {
     /// What came of it.
     pub(crate) fn projected<B>(&self, distribution: B) -> Projected<B> {
         let Self { evaluations, not_finite, .. } = *self;
-        Projected { distribution, evaluations, not_finite, spared: 0, truncated: false }
+        Projected {
+            distribution,
+            evaluations,
+            terms: evaluations,
+            interpolated: 0,
+            not_finite,
+            spared: 0,
+            truncated: false,
+        }
     }
 
-    /// The value in a direction of any length but 0.
-    pub(crate) fn at(&mut self, position: Vec3) -> Rgb {
+    /// The value of the function in a direction of any length but 0.
+    pub(crate) fn at(&mut self, position: Vec3, f: impl FnOnce(Vec3) -> Rgb) -> Rgb {
         let mut direction = position.normalize();
         if let Some(support) = self.support.filter(|_| !self.is_inside(direction)) {
             match support.beyond {
@@ -115,7 +126,7 @@ impl<'a, F: FnMut(Vec3) -> Rgb> Sampler<'a, F> {
             }
         }
         self.evaluations += 1;
-        let value = (self.f)(direction);
+        let value = f(direction);
         if !value.is_finite() {
             self.not_finite += 1;
             return Rgb::ZERO;

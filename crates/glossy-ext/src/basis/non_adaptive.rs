@@ -169,10 +169,10 @@ impl Basis for NonAdaptive {
     type Settings = Level;
 
     /// Evaluates the function at the vertices: peaks between them are missed.
-    fn project(settings: &Level, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected<Self> {
+    fn project(settings: &Level, known: &Known<'_>, mut f: impl FnMut(Vec3) -> Rgb) -> Projected<Self> {
         let level = settings.0.min(Level::MAX);
-        let mut sampler = Sampler::new(f, known.support.as_ref());
-        let values: Vec<Rgb> = Mesh::of(level).vertices.iter().map(|&v| sampler.at(v)).collect();
+        let mut sampler = Sampler::new(known.support.as_ref());
+        let values: Vec<Rgb> = Mesh::of(level).vertices.iter().map(|&v| sampler.at(v, &mut f)).collect();
         sampler.projected(Self::new(level, &values))
     }
 

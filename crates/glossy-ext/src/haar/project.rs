@@ -1,13 +1,15 @@
 //! Top-down projection (paper, section 4.2).
 
 use super::mesh::{Mesh, Midpoint, NO_VERTEX, Tri};
+use super::terms::{Active, Found, Terms};
 use super::{Haar, MAX_LEVEL, MAX_UNIFORM_LEVEL};
 use crate::Rgb;
 use crate::basis::triangle::{ConeTest, Triangle, midpoints};
-use crate::basis::{Known, Peak, Projected, Sampler, Support};
+use crate::basis::{Known, Peak, Projected, Sampler, Sum, Support};
 use glam::Vec3;
 use hr_diffuse::Cone;
-use std::f32::consts::FRAC_PI_2;
+use std::cell::RefCell;
+use std::f32::consts::{FRAC_PI_2, PI};
 
 /// When a triangle is subdivided.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,13 +76,26 @@ impl Refinement {
     /// Whether a triangle must be subdivided. `center` includes the offset; `largest` is the largest component met
     /// so far, `error` how exact interpolation is to be at least.
     pub(super) fn is_rough(&self, variation: &Variation, center: Rgb, largest: f32, error: f32) -> bool {
-        let size = center.abs().max_element().max(self.negligible * largest);
+        let size = self.size(center, largest);
         let spread = self.spread(variation);
         match self.refiner {
             Refiner::Relative(epsilon) => spread > epsilon * size,
             Refiner::Interpolation(epsilon) => spread > epsilon.min(error) * size,
             Refiner::Absolute(threshold) => spread > threshold,
         }
+    }
+
+    /// What linear interpolation may be wrong by where a triangle is not divided; 0 where the refiner does not ask for that.
+    pub(super) fn allowed(&self, center: Rgb, largest: f32, error: f32) -> f32 {
+        match self.refiner {
+            Refiner::Relative(_) | Refiner::Absolute(_) => 0.0,
+            Refiner::Interpolation(epsilon) => epsilon.min(error) * self.size(center, largest),
+        }
+    }
+
+    /// What differences count relative to.
+    fn size(&self, center: Rgb, largest: f32) -> f32 {
+        center.abs().max_element().max(self.negligible * largest)
     }
 
     /// What differs over a triangle, as the refiner sees it.
@@ -107,7 +122,7 @@ fn peak_test(peak: &Peak, max_level: u8) -> Option<(ConeTest, u8)> {
         return None;
     }
     let level = level_of(peak.width, max_level);
-    let cone = Cone { axis: peak.direction.normalize(), cos_angle: peak.width.clamp(0.0, std::f32::consts::PI).cos() };
+    let cone = Cone { axis: peak.direction.normalize(), cos_angle: peak.width.clamp(0.0, PI).cos() };
     Some((ConeTest::new(&cone), level))
 }
 
@@ -120,7 +135,9 @@ fn level_of(width: f32, max_level: u8) -> u8 {
 #[derive(Clone, Copy, Default)]
 struct Finding {
     /// The function in its middle, if sampled.
-    center: Option<Rgb>,
+    center: Option<(Rgb, Found)>,
+    /// The terms that are evaluated in it.
+    active: Active,
     /// Not to be tested: the parent was smooth and is divided for balance only.
     accepted: bool,
 }
@@ -132,6 +149,12 @@ impl Haar {
     ///
     /// Depends on nothing but the arguments: the same function gives the same distribution, bit by bit.
     pub fn project(settings: &Refinement, known: &Known<'_>, f: impl FnMut(Vec3) -> Rgb) -> Projected<Self> {
+        Self::project_sum(settings, known, &Whole(RefCell::new(f)))
+    }
+
+    /// The same of a sum of terms. With [`Refiner::Interpolation`] those that are smooth around some directions are interpolated
+    /// between these, if that changes much less than the refiner lets be wrong.
+    pub fn project_sum(settings: &Refinement, known: &Known<'_>, sum: &impl Sum) -> Projected<Self> {
         let max_level = level_of(known.finest, settings.max_level());
         let min_level = settings.min_level().min(max_level);
         let support = known.support.as_ref();
@@ -139,9 +162,10 @@ impl Haar {
         let peaks: Vec<_> = known.peaks.iter().filter_map(|p| peak_test(p, max_level)).collect();
         let peak_level = peaks.iter().map(|p| p.1).max().unwrap_or(0);
 
-        let mut sampler = Sampler::new(f, support);
-        let mut mesh = Mesh::new(|p| sampler.at(p));
-        let mut findings = vec![Finding::default(); mesh.tris.len()];
+        let mut samples = Samples { sampler: Sampler::new(support), terms: Terms::new(sum), vertices: Vec::new() };
+        let all = samples.terms.all();
+        let mut mesh = Mesh::new(|p| samples.vertex(&all, Vec3::ZERO, p));
+        let mut findings = vec![Finding { active: all, ..Finding::default() }; mesh.tris.len()];
         let (mut truncated, mut spared) = (false, 0);
         // The mesh grows while it is walked, coarse triangles first.
         let mut next = 0;
@@ -162,10 +186,10 @@ impl Haar {
                 || tri.level < peak_level && peaks.iter().any(|(c, l)| tri.level < *l && triangle.touches(c));
             let divide = may_divide
                 && (forced || {
-                    let center = center_of(&mut findings[index], &mut sampler, &triangle);
-                    let variation = variation(&sampler, &mesh, &tri, &triangle, center);
+                    let center = samples.center(&mut findings[index], &triangle);
+                    let variation = variation(&samples.sampler, &mesh, &tri, &triangle, center);
                     let middle = center + known.offset;
-                    let is_rough = settings.is_rough(&variation, middle, sampler.largest, known.error);
+                    let is_rough = settings.is_rough(&variation, middle, samples.sampler.largest, known.error);
                     let counts = is_rough && settings.spread(&variation) > known.negligible;
                     spared += usize::from(is_rough && !counts);
                     counts
@@ -173,33 +197,103 @@ impl Haar {
             if !divide {
                 findings[index].accepted = true;
                 if settings.preserve_energy {
-                    center_of(&mut findings[index], &mut sampler, &triangle);
+                    samples.center(&mut findings[index], &triangle);
                 }
                 continue;
             }
-            truncated |= !mesh.divide(index as u32, &mut |m: &Midpoint| sampler.at(m.position));
+            samples.part(&mut findings[index], &tri, &triangle, |center, largest| {
+                settings.allowed(center + known.offset, largest, known.error).max(known.negligible)
+            });
+            truncated |= !mesh.divide(index as u32, &mut |m: &Midpoint| {
+                let mut at = Vec3::splat(0.5);
+                at[m.edge] = 0.0;
+                samples.vertex(&findings[m.tri as usize].active, at, m.position)
+            });
             inherit(&mesh, &mut findings);
         }
         if settings.preserve_energy {
             keep_means(&mut mesh, &findings, support);
         }
-        Projected { truncated, spared, ..sampler.projected(mesh.pack()) }
+        let Terms { evaluated, interpolated, .. } = samples.terms;
+        let projected = samples.sampler.projected(mesh.pack());
+        Projected { truncated, spared, terms: evaluated, interpolated, ..projected }
     }
 }
 
-/// The sample in the middle of a triangle, taken once. It counts as zero outside the support.
-fn center_of(finding: &mut Finding, sampler: &mut Sampler<'_, impl FnMut(Vec3) -> Rgb>, triangle: &Triangle) -> Rgb {
-    *finding.center.get_or_insert_with(|| sampler.at(triangle.center()))
+/// A function that is no sum: one term.
+struct Whole<F>(RefCell<F>);
+
+impl<F: FnMut(Vec3) -> Rgb> Sum for Whole<F> {
+    type Term = ();
+
+    fn terms(&self) -> &[()] {
+        &[()]
+    }
+
+    fn peak(&self, (): &()) -> Peak {
+        Peak { direction: Vec3::Z, width: PI }
+    }
+
+    fn add_up(&self, _: &[()], direction: Vec3) -> Rgb {
+        self.0.borrow_mut()(direction)
+    }
+
+    fn value(&self, _: Vec3, sum: Rgb) -> Rgb {
+        sum
+    }
+}
+
+/// How a sum is sampled, and what was found.
+struct Samples<'a, S: Sum> {
+    sampler: Sampler<'a>,
+    terms: Terms<'a, S>,
+    /// By vertex of the mesh.
+    vertices: Vec<Found>,
+}
+
+impl<S: Sum> Samples<'_, S> {
+    /// The value at a point of a triangle whose barycentric coordinates there are `at`.
+    fn at(&mut self, active: &Active, at: Vec3, position: Vec3) -> (Rgb, Found) {
+        let mut found = Found::NOTHING;
+        let terms = &mut self.terms;
+        let value = self.sampler.at(position, |direction| {
+            let (value, here) = terms.at(active, at, direction);
+            found = here;
+            value
+        });
+        (value, found)
+    }
+
+    /// The same at a new vertex.
+    fn vertex(&mut self, active: &Active, at: Vec3, position: Vec3) -> Rgb {
+        let (value, found) = self.at(active, at, position);
+        self.vertices.push(found);
+        value
+    }
+
+    /// The sample in the middle of a triangle, taken once. It counts as zero outside the support.
+    fn center(&mut self, finding: &mut Finding, triangle: &Triangle) -> Rgb {
+        let active = finding.active;
+        finding.center.get_or_insert_with(|| self.at(&active, Vec3::splat(1.0 / 3.0), triangle.center())).0
+    }
+
+    /// Finds out which terms need not be evaluated in the parts of a triangle: none where some of it is outside the support, as nothing is
+    /// known there.
+    fn part(&mut self, finding: &mut Finding, tri: &Tri, triangle: &Triangle, allowed: impl Fn(Rgb, f32) -> f32) {
+        let is_inside = |position: &Vec3| self.sampler.is_inside(*position);
+        if !self.terms.is_partible(&finding.active) || !triangle.corners.iter().all(is_inside) {
+            return;
+        }
+        let center = self.center(finding, triangle);
+        let allowed = allowed(center, self.sampler.largest);
+        let [a, b, c] = tri.corners.map(|vertex| self.vertices[usize::from(vertex)]);
+        let middle = finding.center.map_or(Found::NOTHING, |(_, found)| found);
+        finding.active = self.terms.part(finding.active, triangle, &[a, b, c, middle], allowed);
+    }
 }
 
 /// Variation of the samples inside the support: the step at its border is no reason to subdivide.
-fn variation(
-    sampler: &Sampler<'_, impl FnMut(Vec3) -> Rgb>,
-    mesh: &Mesh,
-    tri: &Tri,
-    triangle: &Triangle,
-    center: Rgb,
-) -> Variation {
+fn variation(sampler: &Sampler<'_>, mesh: &Mesh, tri: &Tri, triangle: &Triangle, center: Rgb) -> Variation {
     let corners = mesh.corner_values(tri);
     let mut range: Option<(Rgb, Rgb)> = None;
     let mut extend = |v: Rgb| range = Some(range.map_or((v, v), |(low, high)| (low.min(v), high.max(v))));
@@ -230,8 +324,9 @@ fn variation(
 /// Findings for triangles that are new: the middle of a triangle is the middle of its middle child.
 fn inherit(mesh: &Mesh, findings: &mut Vec<Finding>) {
     for tri in &mesh.tris[findings.len()..] {
-        let Finding { center, accepted } = findings[tri.parent as usize];
-        findings.push(Finding { center: center.filter(|_| tri.place == 3), accepted });
+        let Finding { center, active, accepted } = findings[tri.parent as usize];
+        let active = active.of_child(usize::from(tri.place));
+        findings.push(Finding { center: center.filter(|_| tri.place == 3), active, accepted });
     }
 }
 
@@ -248,7 +343,7 @@ fn keep_means(mesh: &mut Mesh, findings: &[Finding], support: Option<&Support>) 
             if support.is_some() && tri.corners.iter().any(|&v| outside(mesh.positions[usize::from(v)])) {
                 return None;
             }
-            let center = finding.center.filter(|_| !tri.is_divided())?;
+            let (center, _) = finding.center.filter(|_| !tri.is_divided())?;
             let interpolated: Rgb = mesh.mid_values(tri).iter().sum::<Rgb>() / 3.0;
             Some(mesh.mean(tri) + 0.75 * (center - interpolated))
         })
