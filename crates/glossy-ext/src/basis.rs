@@ -13,7 +13,7 @@ pub(crate) mod half;
 mod harmonics;
 mod known;
 mod non_adaptive;
-mod sum;
+mod superposition;
 #[cfg(test)]
 mod tests;
 pub(crate) mod triangle;
@@ -22,7 +22,7 @@ pub use harmonics::{Harmonics, Order, Window};
 pub(crate) use known::Sampler;
 pub use known::{Beyond, Known, Peak, Projected, Support};
 pub use non_adaptive::{Level, NonAdaptive};
-pub use sum::Sum;
+pub use superposition::Superposition;
 
 use crate::Rgb;
 use glam::Vec3;
@@ -44,7 +44,7 @@ pub trait Basis: Clone + Debug + Default + Send + Sync {
 
     /// The same of a sum of terms. Where a basis adapts, terms that are smooth around some directions are interpolated between these
     /// rather than evaluated, if that changes much less than the settings let be wrong.
-    fn project_sum(settings: &Self::Settings, known: &Known<'_>, sum: &impl Sum) -> Projected<Self> {
+    fn project_sum(settings: &Self::Settings, known: &Known<'_>, sum: &impl Superposition) -> Projected<Self> {
         let count = sum.terms().len();
         let projected = Self::project(settings, known, |direction| sum.at(direction));
         Projected { terms: projected.evaluations * count, ..projected }

@@ -4,7 +4,7 @@ mod albedos;
 mod around;
 
 use crate::Rgb;
-use crate::basis::{Basis, Beyond, Known, Peak, Sum, Support};
+use crate::basis::{Basis, Beyond, Known, Peak, Superposition, Support};
 use crate::haar::{Haar, Refinement};
 use crate::outgoing::{Focus, Outgoing, SHOWN_COSINE};
 use crate::reflector::{Incident, Reflector, Ward};
@@ -436,7 +436,7 @@ struct Lobes<'a> {
     overruled: Cell<u64>,
 }
 
-impl Sum for Lobes<'_> {
+impl Superposition for Lobes<'_> {
     type Term = Incident;
 
     fn terms(&self) -> &[Incident] {

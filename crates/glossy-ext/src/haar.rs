@@ -51,7 +51,7 @@ mod terms;
 #[cfg(test)]
 mod tests;
 
-pub use crate::basis::{Beyond, Known, Peak, Projected, Sum, Support};
+pub use crate::basis::{Beyond, Known, Peak, Projected, Superposition, Support};
 pub use outline::Outline;
 pub use project::{Refinement, Refiner};
 
@@ -453,7 +453,7 @@ impl Basis for Haar {
         Self::project(settings, known, f)
     }
 
-    fn project_sum(settings: &Refinement, known: &Known<'_>, sum: &impl Sum) -> Projected<Self> {
+    fn project_sum(settings: &Refinement, known: &Known<'_>, sum: &impl Superposition) -> Projected<Self> {
         Self::project_sum(settings, known, sum)
     }
 

@@ -124,7 +124,8 @@ impl<L: LightField> Light<'_, L> {
     /// Whether the diffuse light of a cluster in a direction is misjudged by the moments of its normals. Those of a box tell up to four times
     /// too much of its narrow sides, and a tenth too little in between.
     pub(crate) fn is_misjudged(&self, sender: u32, away: Vec3) -> bool {
-        if self.element(sender).kind != Kind::Cluster {
+        // What is pure metal has no diffuse light, nor has any part of it.
+        if self.element(sender).kind != Kind::Cluster || self.exitant.radiosity[sender as usize] == Rgb::ZERO {
             return false;
         }
         let by_moments = self.shown(sender, away, 0);

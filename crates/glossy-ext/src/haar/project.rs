@@ -5,7 +5,7 @@ use super::terms::{Active, Found, Terms};
 use super::{Haar, MAX_LEVEL, MAX_UNIFORM_LEVEL};
 use crate::Rgb;
 use crate::basis::triangle::{ConeTest, Triangle, midpoints};
-use crate::basis::{Known, Peak, Projected, Sampler, Sum, Support};
+use crate::basis::{Known, Peak, Projected, Sampler, Superposition, Support};
 use glam::Vec3;
 use hr_diffuse::Cone;
 use std::cell::RefCell;
@@ -154,7 +154,7 @@ impl Haar {
 
     /// The same of a sum of terms. With [`Refiner::Interpolation`] those that are smooth around some directions are interpolated
     /// between these, if that changes much less than the refiner lets be wrong.
-    pub fn project_sum(settings: &Refinement, known: &Known<'_>, sum: &impl Sum) -> Projected<Self> {
+    pub fn project_sum(settings: &Refinement, known: &Known<'_>, sum: &impl Superposition) -> Projected<Self> {
         let max_level = level_of(known.finest, settings.max_level());
         let min_level = settings.min_level().min(max_level);
         let support = known.support.as_ref();
@@ -223,7 +223,7 @@ impl Haar {
 /// A function that is no sum: one term.
 struct Whole<F>(RefCell<F>);
 
-impl<F: FnMut(Vec3) -> Rgb> Sum for Whole<F> {
+impl<F: FnMut(Vec3) -> Rgb> Superposition for Whole<F> {
     type Term = ();
 
     fn terms(&self) -> &[()] {
@@ -244,14 +244,14 @@ impl<F: FnMut(Vec3) -> Rgb> Sum for Whole<F> {
 }
 
 /// How a sum is sampled, and what was found.
-struct Samples<'a, S: Sum> {
+struct Samples<'a, S: Superposition> {
     sampler: Sampler<'a>,
     terms: Terms<'a, S>,
     /// By vertex of the mesh.
     vertices: Vec<Found>,
 }
 
-impl<S: Sum> Samples<'_, S> {
+impl<S: Superposition> Samples<'_, S> {
     /// The value at a point of a triangle whose barycentric coordinates there are `at`.
     fn at(&mut self, active: &Active, at: Vec3, position: Vec3) -> (Rgb, Found) {
         let mut found = Found::NOTHING;

@@ -7,7 +7,7 @@
 
 use crate::Rgb;
 use crate::basis::triangle::{ConeTest, Triangle, child_corners, midpoints};
-use crate::basis::{Peak, Sum};
+use crate::basis::{Peak, Superposition};
 use glam::Vec3;
 use hr_diffuse::Cone;
 use std::f32::consts::PI;
@@ -62,7 +62,7 @@ impl Found {
 }
 
 /// The terms of a sum while it is projected.
-pub(super) struct Terms<'a, S: Sum> {
+pub(super) struct Terms<'a, S: Superposition> {
     sum: &'a S,
     peaks: Vec<Option<ConeTest>>,
     /// Lists of terms, one after the other: each is sorted, and a part of a list before it.
@@ -74,7 +74,7 @@ pub(super) struct Terms<'a, S: Sum> {
     pub(super) interpolated: usize,
 }
 
-impl<'a, S: Sum> Terms<'a, S> {
+impl<'a, S: Superposition> Terms<'a, S> {
     pub(super) fn new(sum: &'a S) -> Self {
         let listed = sum.terms().to_vec();
         let indices = (0..listed.len() as u32).map(|i| i as u16).collect();
@@ -199,7 +199,7 @@ mod tests {
         }
     }
 
-    impl Sum for Lobes {
+    impl Superposition for Lobes {
         type Term = (Vec3, f32);
 
         fn terms(&self) -> &[(Vec3, f32)] {

@@ -155,10 +155,11 @@ impl Reflector for Compensated {
             return Rgb::ZERO;
         }
         let out = self.losses.at(outgoing.z);
-        let rest = incident.iter().filter_map(|sample| {
-            Disk::new(sample.direction, sample.extent).map(|disk| sample.irradiance * self.rest(disk.mean_cos, out))
+        let mut rest = Rgb::ZERO;
+        let lobes = self.single.reflect_each(incident, outgoing, |sample, disk| {
+            rest += sample.irradiance * self.rest(disk.mean_cos, out);
         });
-        self.single.reflect_sum(incident, outgoing) + rest.sum::<Rgb>()
+        lobes + rest
     }
 
     fn glossy_bound(&self, incident: &Cone, outgoing: Vec3) -> f32 {

@@ -125,6 +125,31 @@ impl MetallicRoughness {
         (self.at_meeting(&meeting, density, outgoing), schlick(meeting.h), schlick(h))
     }
 
+    /// [`Reflector::reflect_sum`]; `each` is told of every sample that is above the horizon what is visible of it.
+    #[inline]
+    pub(super) fn reflect_each(
+        &self,
+        incident: &[Incident],
+        outgoing: Vec3,
+        mut each: impl FnMut(&Incident, &Disk),
+    ) -> Rgb {
+        if !above(outgoing) {
+            return Rgb::ZERO;
+        }
+        // Everything is linear in three numbers per sample; colours come last.
+        let (mut head_on, mut grazing, mut matte) = (Rgb::ZERO, Rgb::ZERO, Rgb::ZERO);
+        for sample in incident {
+            if let Some(disk) = Disk::new(sample.direction, sample.extent) {
+                let (lobe, w, mean_w) = self.lobe_over(&disk, &sample.contour, outgoing);
+                head_on += sample.irradiance * (lobe * (1.0 - w));
+                grazing += sample.irradiance * (lobe * w);
+                matte += sample.irradiance * (MEAN_W - mean_w);
+                each(sample, &disk);
+            }
+        }
+        self.f0 * head_on + grazing + self.matte * (1.0 - DIELECTRIC_F0) * matte
+    }
+
     /// The lobe where it meets a sender, over which its density of slopes is this.
     #[inline]
     fn at_meeting(&self, meeting: &Meeting, density: f32, outgoing: Vec3) -> f32 {
@@ -187,20 +212,7 @@ impl Reflector for MetallicRoughness {
     }
 
     fn reflect_sum(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
-        if !above(outgoing) {
-            return Rgb::ZERO;
-        }
-        // Everything is linear in three numbers per sample; colours come last.
-        let (mut head_on, mut grazing, mut matte) = (Rgb::ZERO, Rgb::ZERO, Rgb::ZERO);
-        for sample in incident {
-            if let Some(disk) = Disk::new(sample.direction, sample.extent) {
-                let (lobe, w, mean_w) = self.lobe_over(&disk, &sample.contour, outgoing);
-                head_on += sample.irradiance * (lobe * (1.0 - w));
-                grazing += sample.irradiance * (lobe * w);
-                matte += sample.irradiance * (MEAN_W - mean_w);
-            }
-        }
-        self.f0 * head_on + grazing + self.matte * (1.0 - DIELECTRIC_F0) * matte
+        self.reflect_each(incident, outgoing, |_, _| {})
     }
 
     fn glossy_bound(&self, incident: &Cone, outgoing: Vec3) -> f32 {

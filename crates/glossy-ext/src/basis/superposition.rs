@@ -7,7 +7,7 @@ use glam::Vec3;
 /// A function of a direction that is made of a sum of terms.
 ///
 /// Bases that adapt need not ask for all terms everywhere: where a term is smooth it is known from a few directions.
-pub trait Sum {
+pub trait Superposition {
     /// What a term is.
     type Term: Copy;
 
