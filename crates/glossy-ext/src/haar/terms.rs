@@ -18,8 +18,9 @@ const SHARE: f32 = 0.03;
 /// A term is wrong by at least this share of how much it varies over the triangle, as four samples may happen to lie on a
 /// line.
 const LEAST_BEND: f32 = 1.0 / 32.0;
-/// Fewer terms are not looked at one by one.
+/// Fewer terms are not looked at one by one, and neither are more than there are numbers for.
 const FEWEST: u32 = 6;
+const MOST: u32 = 1 << 16;
 /// Nothing was kept of a point.
 const NONE: u32 = u32::MAX;
 
@@ -78,7 +79,7 @@ impl<'a, S: Superposition> Terms<'a, S> {
     pub(super) fn new(sum: &'a S) -> Self {
         let listed = sum.terms().to_vec();
         let indices = (0..listed.len() as u32).map(|i| i as u16).collect();
-        let peaks = if listed.len() < FEWEST as usize {
+        let peaks = if !(FEWEST as usize..=MOST as usize).contains(&listed.len()) {
             Vec::new()
         } else {
             let cone = |peak: Peak| Cone { axis: peak.direction, cos_angle: peak.width.clamp(0.0, PI).cos() };
@@ -94,7 +95,7 @@ impl<'a, S: Superposition> Terms<'a, S> {
 
     /// Whether terms are looked at one by one.
     pub(super) fn is_partible(&self, active: &Active) -> bool {
-        active.count() >= FEWEST
+        (FEWEST..=MOST).contains(&active.count())
     }
 
     /// The function in a unit direction, at the point of a triangle whose barycentric coordinates are given, and what is kept of it.
