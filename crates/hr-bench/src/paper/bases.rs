@@ -23,7 +23,7 @@ const ERROR: f32 = 0.1;
 /// Levels of the non-adaptive basis.
 const LEVELS: [u8; 4] = [3, 4, 5, 6];
 /// ε and last level of our refiner, ever finer: at each level the ε beyond which a smaller one brings little.
-const FINER: [(f32, u8); 7] = [(0.2, 3), (0.2, 4), (0.2, 5), (0.1, 6), (0.05, 5), (0.02, 5), (0.02, 6)];
+const FINER: [(f32, u8); 8] = [(0.2, 3), (0.2, 4), (0.2, 5), (0.1, 5), (0.07, 5), (0.05, 5), (0.02, 5), (0.02, 6)];
 /// Error that the solver is asked for to show the solution.
 const SHOWN_ERROR: f32 = 0.05;
 /// Width of the pictures, pixels.
