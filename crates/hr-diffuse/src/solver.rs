@@ -64,6 +64,9 @@ const AGAIN: usize = 4;
 /// range of f32.
 const MOST_LIGHT: f32 = 1e30;
 
+/// No light shrinks by less than the brightest material reflects, from one iteration to the next, but for this.
+const REFLECTED_MARGIN: f32 = 0.02;
+
 /// Channels with less than this share of the strongest one's light need not converge by themselves.
 const FAINT_CHANNEL: f64 = 1e-3;
 
@@ -801,12 +804,17 @@ impl<L: LightField> Solver<L> {
         if area > 0.0 { (lit / area) as f32 } else { (power / f64::from(self.area)) as f32 }
     }
 
-    /// Whether each of the last iterations since the first of a series changed more than the one before or the one before that:
-    /// light that does not die out.
+    /// Whether each of the last iterations since the first of a series changed more than what its materials could leave of the one before
+    /// or the one before that: light that does not die out, or hardly does.
     fn grows(&self, iteration: u32) -> bool {
         const LAST: usize = 5;
         let last = &self.stats.residuals[self.stats.residuals.len().saturating_sub(LAST)..];
-        iteration as usize >= LAST && last.windows(3).all(|three| three[2] > three[0])
+        let reflected = |material: usize| {
+            (self.scene.materials[material].reflectance + self.faint[material] + self.strong[material]).max_element()
+        };
+        let most = (0..self.scene.materials.len()).map(reflected).fold(0.0, f32::max);
+        let kept = (most + REFLECTED_MARGIN).min(1.0);
+        iteration as usize >= LAST && last.windows(3).all(|three| three[2] > kept * kept * three[0])
     }
 
     /// By link: the area that it lights, times what lets its light through.
