@@ -185,7 +185,7 @@ impl Gather {
         self.push.places.nodes.iter().copied().zip(diffuse).collect()
     }
 
-    /// By place, the sum of what `of` says of senders with extent, times their form factors.
+    /// By place, the sum of what `of` says of senders with extent, times form factors and visibility.
     pub(crate) fn weigh<L: LightField>(
         &self,
         light: Light<'_, L>,

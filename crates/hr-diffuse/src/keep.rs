@@ -254,6 +254,7 @@ impl Exitant {
             exitant.adaptation.len(),
         ];
         fits(lengths.iter().all(|&length| length == nodes), "arrays by node")?;
+        fits(exitant.adaptation.iter().all(|&counts| counts > 0.0), "what errors count")?;
         fits(exitant.reflected_as.iter().all(|&node| (node as usize) < nodes), "nodes that stand for others")?;
         let Senders { ranges, standing } = &exitant.senders;
         let are_within = ranges.iter().all(|&[first, end]| first <= end && end as usize <= standing.len());

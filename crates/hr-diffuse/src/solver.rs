@@ -64,7 +64,7 @@ const AGAIN: usize = 4;
 /// range of f32.
 const MOST_LIGHT: f32 = 1e30;
 
-/// No light shrinks by less than the brightest material reflects, from one iteration to the next, but for this.
+/// From one iteration to the next no more of a change is left than the share that the brightest material reflects, and this.
 const REFLECTED_MARGIN: f32 = 0.02;
 
 /// Channels with less than this share of the strongest one's light need not converge by themselves.

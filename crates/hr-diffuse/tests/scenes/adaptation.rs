@@ -20,7 +20,7 @@ fn chest(at: DVec3, size: DVec3) -> Vec<Surface> {
     ]
 }
 
-/// Two rooms of 4 × 4 × 2.6 m, a lamp at the ceiling of the first, a door between them, a chest in the second. The last six surfaces are
+/// Two rooms of 4 × 4 × 2.6 m, a lamp at the ceiling of the first, a door between them, a chest in the second. The last five surfaces are
 /// what there is of the second room's floor, its walls and its ceiling.
 fn rooms() -> SceneInput {
     let (y, z) = (DVec3::Y * 4.0, DVec3::Z * 2.6);
