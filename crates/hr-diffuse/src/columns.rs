@@ -18,12 +18,12 @@ pub(crate) const FREELY: f32 = 1.4;
 pub(crate) const STRICTLY: f32 = 0.9;
 
 /// By node: the factor, at most 1, for the directional light of all its links, which was made of this irradiance of leaves. `lit`
-/// is the area that each link lights, times what lets its light through.
+/// is the area that each link lights, times what lets its light through; `most`, by leaf, what its links may carry.
 pub(crate) fn gains<L: LightField>(
     light: Light<'_, L>,
     links: &Links,
     lit: &[f32],
-    most: f32,
+    most: &[f32],
     irradiance: &[Rgb],
 ) -> Vec<f32> {
     let nodes = &light.elements.nodes;
@@ -44,7 +44,7 @@ pub(crate) fn gains<L: LightField>(
     for (node, element) in nodes.iter().enumerate().rev() {
         if element.active && element.is_patch() && element.child_count == 0 {
             let glossy = irradiance[node] * (Rgb::ONE - element.reflectance);
-            power[node] = most * glossy.element_sum() * element.area;
+            power[node] = most[node] * glossy.element_sum() * element.area;
         }
         if node > 0 {
             power[element.parent as usize] += power[node];

@@ -26,6 +26,7 @@ mod footprint;
 pub mod form_factor;
 mod gather;
 pub mod geometry;
+mod growth;
 pub mod hierarchy;
 pub mod hooks;
 mod inherited;

@@ -199,7 +199,10 @@ impl<L: LightField> Solver<L> {
         let new = shot.as_ref().map(|shot| shot.new.as_slice());
         if self.reflect_standing(new, watch) {
             let irradiance = new.unwrap_or(&self.exitant.irradiance);
-            self.exitant.gain = gains(self.light(), &self.links, self.lit(), self.most_reflected, irradiance);
+            let mut growth = std::mem::take(&mut self.growth);
+            let most = growth.most(self.elements.nodes.len());
+            self.exitant.gain = gains(self.light(), &self.links, self.lit(), most, irradiance);
+            self.growth = growth;
         }
         self.shot = shot;
     }

@@ -2,12 +2,12 @@
 
 use crate::adaptation::adaptation;
 use crate::budget::{Account, Budget, Spent};
-use crate::columns::{FREELY, STRICTLY};
 use crate::convergence::Convergence;
 use crate::error::SolveError;
 use crate::exposed::expose;
 use crate::gather::Gather;
 use crate::geometry::{Geometry, Normalization};
+use crate::growth::Growth;
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::kept_weights::KeptWeights;
@@ -181,8 +181,8 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) shown: Vec<(u32, L::Exitant)>,
     /// What has been shot, while light is.
     pub(crate) shot: Option<Shot>,
-    /// What links may carry of directional light: see [`columns`](crate::columns).
-    pub(crate) most_reflected: f32,
+    /// What links may carry of the directional light of leaves: see [`columns`](crate::columns).
+    pub(crate) growth: Growth,
     /// Whether leaves are reflected anew where little has changed, too.
     pub(crate) reflects_finely: bool,
     /// Largest radiance of each leaf's directional light (max channel).
@@ -270,7 +270,7 @@ impl<L: LightField> Solver<L> {
             last_negligible: Vec::new(),
             shown: Vec::new(),
             shot: None,
-            most_reflected: FREELY,
+            growth: Growth::default(),
             reflects_finely: false,
             brightest: Vec::new(),
             area,
@@ -442,6 +442,8 @@ impl<L: LightField> Solver<L> {
         let mut before = self.begin_shooting(reflects);
         // Light settles with what leaves have reflected of much of it, and once more with what all reflect of all of it.
         let directional = reflects && self.elements.nodes[0].active;
+        let kept = self.kept();
+        self.growth.restart();
         let (mut settled, mut finely) = (false, !directional || self.shot.is_some());
         for iteration in 0..if before.is_some() { MOST_ITERATIONS } else { most } {
             let fraction = pass.fraction(0.6 + 0.3 * (iteration as f32 / (iteration as f32 + 4.0)));
@@ -452,8 +454,8 @@ impl<L: LightField> Solver<L> {
             };
             let Some(residual) = self.iterate(reflects, ask) else { break };
             (before, self.reflects_finely) = (None, false);
-            if self.grows(iteration) {
-                self.most_reflected = (self.most_reflected * 0.7).max(STRICTLY);
+            if directional && iteration % 2 == 1 {
+                self.growth.rein_in(&self.exitant.irradiance, kept);
             }
             settled = self.remaining(residual) < share * self.settings.error && iteration > 0;
             if settled && !finely {
@@ -566,6 +568,7 @@ impl<L: LightField> Solver<L> {
         // The links are about to be others.
         self.stats.error = None;
         self.convergence.restart();
+        self.growth = Growth::default();
         let (links, unlit) = (self.links.take(), std::mem::take(&mut self.unfinished.unlit));
         let nodes = self.elements.nodes.len() as u64;
         let mut light = MutableLight {
@@ -804,17 +807,13 @@ impl<L: LightField> Solver<L> {
         if area > 0.0 { (lit / area) as f32 } else { (power / f64::from(self.area)) as f32 }
     }
 
-    /// Whether each of the last iterations since the first of a series changed more than what its materials could leave of the one before
-    /// or the one before that: light that does not die out, or hardly does.
-    fn grows(&self, iteration: u32) -> bool {
-        const LAST: usize = 5;
-        let last = &self.stats.residuals[self.stats.residuals.len().saturating_sub(LAST)..];
+    /// Of a change of light no more than this share is left two iterations later.
+    fn kept(&self) -> f32 {
         let reflected = |material: usize| {
             (self.scene.materials[material].reflectance + self.faint[material] + self.strong[material]).max_element()
         };
         let most = (0..self.scene.materials.len()).map(reflected).fold(0.0, f32::max);
-        let kept = (most + REFLECTED_MARGIN).min(1.0);
-        iteration as usize >= LAST && last.windows(3).all(|three| three[2] > kept * kept * three[0])
+        (most + REFLECTED_MARGIN).min(1.0).powi(2)
     }
 
     /// By link: the area that it lights, times what lets its light through.
