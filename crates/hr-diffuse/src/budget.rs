@@ -1,5 +1,6 @@
 //! Budgets of time and memory: where one is spent, refinement ends, and light settles over what is linked by then.
 
+use crate::clock::Instant;
 use crate::gather;
 use crate::hierarchy::{Element, Elements};
 use crate::hooks::LightField;
@@ -8,7 +9,7 @@ use crate::shooting;
 use crate::solver::{Settings, Transport};
 use crate::threads::prelude::*;
 use crate::{Facing, Rgb};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// What a solve may cost; without limits by default.
 ///
@@ -19,7 +20,8 @@ use std::time::{Duration, Instant};
 pub struct Budget {
     /// Wall-clock time from the making of the solver (the scene's hierarchy included) to the end of refinement. Light
     /// may settle for a quarter more; then a few iterations over the links that there are must do. Values at vertices
-    /// and the final reflection for display come after it.
+    /// and the final reflection for display come after it. On `wasm32-unknown-unknown`, which has no clock, it is never spent: break
+    /// off by what is watching instead.
     pub time: Option<Duration>,
     /// Bytes of elements, links and what the extension keeps of them while light is transported; the pairs that a
     /// refinement looks at come on top. What the scene itself takes must be had anyhow: no budget is too small for a

@@ -14,11 +14,10 @@ use crate::scene::{Light, LightKind};
 use crate::sealed::{Side, is_back, lit_sides};
 use crate::skips::Skips;
 use crate::threads::prelude::*;
+use crate::tree::{Leaves, tree};
 use crate::visibility::Visibility;
 use crate::{Cone, DiffuseMaterial, Facing, Rgb, SurfaceReflectance};
 use glam::{Vec2, Vec3};
-use obvhs::BvhBuildParams;
-use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
@@ -683,17 +682,7 @@ impl Tree {
             return trees.into_iter().next();
         }
         let boxes: Vec<Boxed> = trees.iter().map(|tree| Boxed(tree.bounds())).collect();
-        let params = BvhBuildParams {
-            pre_split: false,
-            ploc_search_distance: PlocSearchDistance::High,
-            search_depth_threshold: 0,
-            reinsertion_batch_ratio: 0.2,
-            post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
-            sort_precision: SortPrecision::U64,
-            max_prims_per_leaf: 1,
-            collapse_traversal_cost: 1.0,
-        };
-        let bvh = obvhs::bvh2::builder::build_bvh2(&boxes, params, &mut std::time::Duration::default());
+        let bvh = tree(&boxes, &Leaves { most: 1, step_cost: 1.0, reinserted: false });
         let mut slots: Vec<Option<Self>> = trees.into_iter().map(Some).collect();
         Some(Self::convert(&bvh, 0, &mut slots))
     }

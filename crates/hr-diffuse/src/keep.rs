@@ -5,6 +5,7 @@
 //! tree, all light is finite.
 
 use crate::budget::Spent;
+use crate::clock::Instant;
 use crate::face_clusters::FaceClusters;
 use crate::flat::{FlatError, Reader, Writer, are_offsets, fits, is_finite};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
@@ -22,7 +23,6 @@ use crate::vertices::{Corner, Vertices};
 use crate::visibility::Visibility;
 use crate::{Normalization, Rgb, SceneInput, SolveError};
 use std::io;
-use std::time::Instant;
 
 /// An extension whose light can be kept.
 pub trait Keep: LightField {

@@ -13,6 +13,7 @@
 mod adaptation;
 pub mod budget;
 mod calibrate;
+mod clock;
 mod columns;
 pub mod cone;
 mod contacts;
@@ -64,6 +65,7 @@ mod steady;
 pub mod threads;
 pub mod toward;
 mod transport;
+mod tree;
 mod twins;
 pub mod vertices;
 pub mod visibility;

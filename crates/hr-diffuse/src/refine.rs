@@ -6,6 +6,7 @@
 
 use crate::Rgb;
 use crate::budget::{Account, Growth, Spent};
+use crate::clock::Instant;
 use crate::form_factor::{self, Accuracy, Part};
 use crate::hierarchy::{Element, Elements, Kind};
 use crate::hooks::LightField;
@@ -25,7 +26,6 @@ use glam::{DVec3, Vec3};
 use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
 
 /// Share of the oracle's interval that counts as error where it stems from geometry: the transported value is an
 /// average over the interval, and display renews the geometry per vertex.

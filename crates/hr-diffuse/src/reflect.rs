@@ -3,6 +3,7 @@
 //! a distant cluster a few stand for all, and their light is added up in the direction asked for, which costs less than
 //! averages over all directions.
 
+use crate::clock::Instant;
 use crate::columns::gains;
 use crate::face_clusters::FaceClusters;
 use crate::hierarchy::Elements;
@@ -395,7 +396,7 @@ impl<L: LightField> Solver<L> {
     /// [`finish`](Self::finish) on; light goes on between elements by what stands for many. Where `watch` breaks, the rest is
     /// shown as it is.
     pub fn reflect_for_display(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
-        let start = std::time::Instant::now();
+        let start = Instant::now();
         let shown = SHOWN_SHARE * self.settings.error * self.mean_irradiance() * FRAC_1_PI;
         let negligible = if self.skips.negligible_detail { shown } else { 0.0 };
         let faces = self.face_clusters();

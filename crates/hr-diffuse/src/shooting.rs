@@ -10,6 +10,7 @@
 //! set `accum` is the sum of what each link carried. It has one sample for each link rather than one for each link
 //! and iteration, and is reflected once when light has settled.
 
+use crate::clock::Instant;
 use crate::hierarchy::Kind;
 use crate::hooks::LightField;
 use crate::links::Links;
@@ -18,7 +19,6 @@ use crate::transport::Light;
 use crate::{Facing, Rgb};
 use glam::Vec3;
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 /// Nodes wait while their unshot light is less than this share of the error asked for, relative to all their light, and to what
 /// the reflections to come would make of it: half of what light may be from settled.

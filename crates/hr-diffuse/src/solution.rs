@@ -1,5 +1,6 @@
 //! A finished solution: what is read from it to show it.
 
+use crate::clock::Instant;
 use crate::face_clusters::FaceClusters;
 use crate::hierarchy::{Elements, SceneData};
 use crate::hooks::{LightField, NodeId};
@@ -13,7 +14,6 @@ use crate::vertices::Vertices;
 use crate::{Rgb, visibility::Hit};
 use glam::Vec2;
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 /// The light in a scene: hierarchy, links, exitant light per element and irradiance per vertex.
 #[derive(Debug)]

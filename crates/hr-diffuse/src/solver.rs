@@ -2,6 +2,7 @@
 
 use crate::adaptation::adaptation;
 use crate::budget::{Account, Budget, Spent};
+use crate::clock::Instant;
 use crate::convergence::Convergence;
 use crate::error::SolveError;
 use crate::exposed::expose;
@@ -29,7 +30,6 @@ use crate::visibility::Visibility;
 use crate::{Facing, LightKind, Rgb, SceneInput};
 use glam::DVec3;
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 /// A link may be wrong by this share of a pass's tolerance, times the mean irradiance.
 const LINK_SHARE: f32 = 0.07;

@@ -7,13 +7,11 @@
 use crate::geometry::{Aabb, Domain, Geometry, Outline};
 use crate::sealed::Side;
 use crate::threads::prelude::*;
+use crate::tree::{Leaves, tree};
 use glam::{BVec4A, Vec2, Vec3, Vec3A, Vec4};
+use obvhs::Boundable;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::ploc::{PlocSearchDistance, SortPrecision};
-use obvhs::{Boundable, BvhBuildParams};
 use smallvec::SmallVec;
-use std::time::Duration;
 
 /// What an end of a segment may touch without being blocked, in unit space: surfaces that abut there. Positions are
 /// rounded to some 2e-7 (twice, on either side), which grazing angles stretch; 1e-5 allows for 2°.
@@ -528,18 +526,7 @@ impl Groups {
     }
 
     fn tree(&self) -> Bvh2 {
-        let parameters = BvhBuildParams {
-            pre_split: false,
-            ploc_search_distance: PlocSearchDistance::High,
-            // Above 0 the lowest levels are paired hastily, which costs large scenes a factor in every ray.
-            search_depth_threshold: 0,
-            reinsertion_batch_ratio: 0.2,
-            post_collapse_reinsertion_batch_ratio_multiplier: 1.0,
-            sort_precision: SortPrecision::U64,
-            max_prims_per_leaf: 4,
-            collapse_traversal_cost: 1.5,
-        };
-        build_bvh2(&self.boxes, parameters, &mut Duration::default())
+        tree(&self.boxes, &Leaves { most: 4, step_cost: 1.5, reinserted: true })
     }
 }
 
