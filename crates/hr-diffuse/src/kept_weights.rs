@@ -1,7 +1,6 @@
 //! Weights of leaves that stay when something has moved: those for senders that shine as they did, where nothing came or went
 //! between leaf and sender. Leaves need not look for themselves again what these bring.
 
-use crate::Rgb;
 use crate::gather::Gather;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
@@ -14,6 +13,9 @@ use std::cmp::Reverse;
 use std::iter::Peekable;
 use std::vec::IntoIter;
 
+/// Links of senders that are up to so many times as bright as they were are taken to be fine enough still: rays find out whether they are.
+const RISEN: f32 = 1.5;
+
 /// What leaves found out over the links that there were.
 #[derive(Debug)]
 pub(crate) struct KeptWeights {
@@ -22,8 +24,8 @@ pub(crate) struct KeptWeights {
     /// By link: whether what has moved does not concern it at all.
     stays: Vec<bool>,
     moved: Moved,
-    /// By node: radiosity when the weights were found.
-    radiosity: Vec<Rgb>,
+    /// By node: radiosity and directional light (sums of channels) when the weights were found.
+    light: Vec<[f32; 2]>,
     /// By node: whether its light is distributed as it was then.
     even: Vec<bool>,
     /// Whether leaves need not look for themselves at other links either: not before most of the light is there.
@@ -32,17 +34,32 @@ pub(crate) struct KeptWeights {
 
 impl KeptWeights {
     /// Those of links of which some stay.
-    pub(crate) fn new(gather: Gather, links: Links, stays: Vec<bool>, moved: Moved, radiosity: Vec<Rgb>) -> Self {
-        Self { gather, links, stays, moved, radiosity, even: Vec::new(), rough: false }
+    pub(crate) fn new(gather: Gather, links: Links, stays: Vec<bool>, moved: Moved, exitant: &Exitant) -> Self {
+        Self { gather, links, stays, moved, light: light(exitant), even: Vec::new(), rough: false }
     }
 
-    /// Leaves out senders whose light is distributed among their parts otherwise than it was, by more than a share.
+    /// Leaves out senders whose light is distributed among their parts otherwise than it was, by more than a share. Where directional
+    /// light goes is not known; as long as it is as much, it is taken to come from where it came from, and to go where it went.
     pub(crate) fn with_light(mut self, elements: &Elements, exitant: &Exitant, share: f32) -> Self {
-        let changed = redistributed(elements, &self.radiosity, &exitant.radiosity);
-        // How directional light is distributed is not known.
-        let even = changed.iter().zip(&exitant.directional).map(|(by, also)| *by <= share && *also == Rgb::ZERO);
-        self.even = even.collect();
+        let now = light(exitant);
+        let changed = redistributed(elements, &self.light, &now);
+        let as_much = |before: Option<&[f32; 2]>, now: [f32; 2]| {
+            now[1] == 0.0 || before.is_some_and(|before| (now[1] - before[1]).abs() <= share * now[1])
+        };
+        let even = |(node, by): (usize, &f32)| *by <= share && as_much(self.light.get(node), now[node]);
+        self.even = changed.iter().enumerate().map(even).collect();
         self
+    }
+
+    /// Links that are as fine as they were made to be, and others: those of senders that are much brighter than they were.
+    pub(crate) fn as_fine_as_ever(&self, links: Vec<Link>, exitant: &Exitant) -> (Vec<Link>, Vec<Link>) {
+        let sum = |[diffuse, directional]: [f32; 2]| diffuse + directional;
+        let now = light(exitant);
+        let is_fine = |link: &Link| {
+            let before = self.light.get(link.sender as usize).copied().map_or(0.0, sum);
+            sum(now[link.sender as usize]) <= RISEN * before
+        };
+        links.into_iter().partition(is_fine)
     }
 
     /// What is to be known a second time: it was used for a rough look at the light.
@@ -74,9 +91,15 @@ pub(crate) fn take(known: &mut Peekable<IntoIter<(Link, Weight)>>, link: &Link) 
     weight.value.is_finite().then_some(weight)
 }
 
+/// By node: radiosity and directional light (sums of channels).
+fn light(exitant: &Exitant) -> Vec<[f32; 2]> {
+    exitant.radiosity.iter().zip(&exitant.directional).map(|it| [it.0.element_sum(), it.1.element_sum()]).collect()
+}
+
 /// By node: by which share of its power the light of its parts is distributed otherwise than it was.
-fn redistributed(elements: &Elements, before: &[Rgb], now: &[Rgb]) -> Vec<f32> {
-    let light = |all: &[Rgb], node: usize| all.get(node).map_or(0.0, |radiosity| radiosity.element_sum());
+fn redistributed(elements: &Elements, before: &[[f32; 2]], now: &[[f32; 2]]) -> Vec<f32> {
+    let light =
+        |all: &[[f32; 2]], node: usize| all.get(node).map_or(0.0, |[diffuse, directional]| diffuse + directional);
     let mut changed = vec![0.0; elements.nodes.len()];
     for (node, element) in elements.nodes.iter().enumerate().rev() {
         let children = element.first_child as usize..(element.first_child + element.child_count) as usize;

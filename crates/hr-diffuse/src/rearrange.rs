@@ -67,12 +67,10 @@ impl<L: LightField> Solver<L> {
         self.stats.kept_links = self.links.all().len() as u64;
         self.stats.renewed_links = links.all().len() as u64 - self.stats.kept_links;
         let prepared = std::mem::replace(&mut self.prepared, false);
-        let (gather, radiosity) = (std::mem::take(&mut self.gather), self.exitant.radiosity.clone());
-        self.kept_weights = prepared.then(|| KeptWeights::new(gather, links, stays, moved, radiosity));
+        let gather = std::mem::take(&mut self.gather);
+        self.kept_weights = prepared.then(|| KeptWeights::new(gather, links, stays, moved, &self.exitant));
         self.unfinished.unlit = [waiting, again].concat();
         self.unfinished.found = f32::INFINITY;
-        // Light may come from elsewhere, though it is as much.
-        self.last_reflected.fill(Rgb::splat(f32::NEG_INFINITY));
         self.solve_again(watch);
         Ok(())
     }

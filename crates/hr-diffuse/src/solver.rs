@@ -367,6 +367,8 @@ impl<L: LightField> Solver<L> {
                 self.settle(pass, &mut stopped, watch);
             }
         }
+        // Roughly it is what it was; but light may come from elsewhere, though it is as much.
+        self.last_reflected.fill(Rgb::splat(f32::NEG_INFINITY));
         self.solve(&mut |progress| if stopped { ControlFlow::Break(()) } else { watch(progress) });
     }
 
@@ -570,6 +572,10 @@ impl<L: LightField> Solver<L> {
         self.convergence.restart();
         self.growth = Growth::default();
         let (links, unlit) = (self.links.take(), std::mem::take(&mut self.unfinished.unlit));
+        let (fine, links) = match &self.kept_weights {
+            Some(known) => known.as_fine_as_ever(links, &self.exitant),
+            None => (Vec::new(), links),
+        };
         let nodes = self.elements.nodes.len() as u64;
         let mut light = MutableLight {
             scene: &self.scene,
@@ -587,7 +593,7 @@ impl<L: LightField> Solver<L> {
         });
         *stopped |= refined.stopped;
         self.stats.spent = self.stats.spent.or(refined.spent);
-        self.links = Links::new(refined.links, light.elements.nodes.len());
+        self.links = Links::new([fine, refined.links].concat(), light.elements.nodes.len());
         if refined.edges > 0 && !refined.stopped && refined.spent.is_none() {
             let (account, links) = (&self.account, self.links.all().len() as u64);
             self.stats.rays += shadows::sew(&mut light, &self.links, tolerance, &mut |nodes| {
