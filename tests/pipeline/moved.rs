@@ -115,3 +115,18 @@ fn moves_one_after_the_other_leave_nothing_behind() {
     let both = shifted(&aside, LAMP..LAMP + 1, DVec3::new(-1.0, 0.2, 0.0));
     rearranged(&[aside, both]);
 }
+
+#[test]
+fn in_a_room_that_is_mostly_glossy_leaves_keep_what_they_found_out() {
+    let scene = Arc::new(Scene::load("room").expect("built in"));
+    let ball = scene.surfaces.iter().position(|surface| matches!(surface.shape, Shape::Sphere { .. }));
+    let ball = ball.expect("something round stands there");
+    let mut solver = solver(&scene);
+    let first = solver.stats().rays;
+    let moved = shifted(&scene, ball..ball + 1, DVec3::new(0.05, 0.0, 0.0));
+    solver.rearrange(&moved.input(), &mut |_| ControlFlow::Continue(())).expect("places of the same surfaces");
+    let stats = solver.stats();
+    let rays = (stats.rays - first) as f64 / first as f64;
+    assert!(stats.error.is_some_and(|error| error < ERROR), "{stats:?}");
+    assert!(rays < 0.35, "{rays} of the rays of the first solve");
+}
