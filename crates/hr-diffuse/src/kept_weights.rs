@@ -1,5 +1,6 @@
 //! Weights of leaves that stay when something has moved: those for senders that shine as they did, where nothing came or went
-//! between leaf and sender. Leaves need not look for themselves again what these bring.
+//! between leaf and sender. Leaves need not look for themselves again what these bring. Which links of theirs are
+//! still fine enough is told from the same light.
 
 use crate::gather::Gather;
 use crate::hierarchy::{Elements, Kind};

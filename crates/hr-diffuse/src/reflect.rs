@@ -200,10 +200,8 @@ impl<L: LightField> Solver<L> {
         let new = shot.as_ref().map(|shot| shot.new.as_slice());
         if self.reflect_standing(new, watch) {
             let irradiance = new.unwrap_or(&self.exitant.irradiance);
-            let mut growth = std::mem::take(&mut self.growth);
-            let most = growth.most(self.elements.nodes.len());
-            self.exitant.gain = gains(self.light(), &self.links, self.lit(), most, irradiance);
-            self.growth = growth;
+            self.feedback.fit(self.elements.nodes.len());
+            self.exitant.gain = gains(self.light(), &self.links, self.lit(), self.feedback.most(), irradiance);
         }
         self.shot = shot;
     }

@@ -6,9 +6,9 @@ use crate::clock::Instant;
 use crate::convergence::Convergence;
 use crate::error::SolveError;
 use crate::exposed::expose;
+use crate::feedback::Feedback;
 use crate::gather::Gather;
 use crate::geometry::{Geometry, Normalization};
-use crate::growth::Growth;
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::kept_weights::KeptWeights;
@@ -182,7 +182,7 @@ pub struct Solver<L: LightField = ()> {
     /// What has been shot, while light is.
     pub(crate) shot: Option<Shot>,
     /// What links may carry of the directional light of leaves: see [`columns`](crate::columns).
-    pub(crate) growth: Growth,
+    pub(crate) feedback: Feedback,
     /// Whether leaves are reflected anew where little has changed, too.
     pub(crate) reflects_finely: bool,
     /// Largest radiance of each leaf's directional light (max channel).
@@ -270,7 +270,7 @@ impl<L: LightField> Solver<L> {
             last_negligible: Vec::new(),
             shown: Vec::new(),
             shot: None,
-            growth: Growth::default(),
+            feedback: Feedback::default(),
             reflects_finely: false,
             brightest: Vec::new(),
             area,
@@ -444,8 +444,7 @@ impl<L: LightField> Solver<L> {
         let mut before = self.begin_shooting(reflects);
         // Light settles with what leaves have reflected of much of it, and once more with what all reflect of all of it.
         let directional = reflects && self.elements.nodes[0].active;
-        let kept = self.kept();
-        self.growth.restart();
+        self.feedback.restart();
         let (mut settled, mut finely) = (false, !directional || self.shot.is_some());
         for iteration in 0..if before.is_some() { MOST_ITERATIONS } else { most } {
             let fraction = pass.fraction(0.6 + 0.3 * (iteration as f32 / (iteration as f32 + 4.0)));
@@ -457,7 +456,8 @@ impl<L: LightField> Solver<L> {
             let Some(residual) = self.iterate(reflects, ask) else { break };
             (before, self.reflects_finely) = (None, false);
             if directional && iteration % 2 == 1 {
-                self.growth.rein_in(&self.exitant.irradiance, kept);
+                let kept = self.kept();
+                self.feedback.rein_in(&self.exitant.irradiance, kept);
             }
             settled = self.remaining(residual) < share * self.settings.error && iteration > 0;
             if settled && !finely {
@@ -570,7 +570,7 @@ impl<L: LightField> Solver<L> {
         // The links are about to be others.
         self.stats.error = None;
         self.convergence.restart();
-        self.growth = Growth::default();
+        self.feedback = Feedback::default();
         let (links, unlit) = (self.links.take(), std::mem::take(&mut self.unfinished.unlit));
         let (fine, links) = match &self.kept_weights {
             Some(known) => known.as_fine_as_ever(links, &self.exitant),

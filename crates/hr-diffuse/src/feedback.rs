@@ -1,4 +1,4 @@
-//! Light that does not die out where more comes back to leaves than they sent.
+//! Feedback: light that does not die out, as more comes back to leaves than they sent.
 //!
 //! The links of a sender may carry somewhat more directional light than it has ([columns](crate::columns)). Two mirror-like surfaces
 //! close before each other then light each other up without end, though all others have long settled. From one iteration to the next
@@ -15,29 +15,33 @@ const NOTICED: f32 = 0.01;
 
 /// What is known of the light of leaves since links were last refined.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Growth {
+pub(crate) struct Feedback {
     /// By node: of what leaves have, their links may carry so much as directional light.
     most: Vec<f32>,
     /// By node: irradiance (sum of channels) two, four and six iterations ago, in that order; fewer at first.
     before: Vec<Vec<f32>>,
 }
 
-impl Growth {
+impl Feedback {
     /// Forgets the series: the light is another one.
     pub(crate) fn restart(&mut self) {
         self.before.clear();
     }
 
-    /// By node: of what leaves have, their links may carry so much as directional light.
-    pub(crate) fn most(&mut self, count: usize) -> &[f32] {
+    /// Makes room for so many nodes.
+    pub(crate) fn fit(&mut self, count: usize) {
         self.most.resize(count, FREELY);
+    }
+
+    /// By node: of what leaves have, their links may carry so much as directional light.
+    pub(crate) fn most(&self) -> &[f32] {
         &self.most
     }
 
     /// Takes the irradiance of every second iteration. Of a change no more than the share `kept` should be left by then.
     pub(crate) fn rein_in(&mut self, irradiance: &[Rgb], kept: f32) {
         let now: Vec<f32> = irradiance.iter().map(|irradiance| irradiance.element_sum()).collect();
-        self.most(now.len());
+        self.fit(now.len());
         if let [one, two, three] = self.before.as_slice() {
             for (node, most) in self.most.iter_mut().enumerate() {
                 let changes = [now[node] - one[node], one[node] - two[node], two[node] - three[node]];
@@ -58,11 +62,11 @@ mod tests {
 
     /// What leaves may send, whose irradiance is as told after each second iteration.
     fn most(series: &[[f32; 2]]) -> Vec<f32> {
-        let mut growth = Growth::default();
+        let mut feedback = Feedback::default();
         for of in series {
-            growth.rein_in(&of.map(|sum| Rgb::new(sum, 0.0, 0.0)), 0.8);
+            feedback.rein_in(&of.map(|sum| Rgb::new(sum, 0.0, 0.0)), 0.8);
         }
-        growth.most(2).to_vec()
+        feedback.most().to_vec()
     }
 
     #[test]
