@@ -1,24 +1,21 @@
 //! Edits against fresh solves: what they take, and how far their light is from that of a solve of the scene as it is then.
 //!
-//! The difference is that of the mean irradiances of surface sides, Σ area |E − E'| / Σ area E'. What moves is the first set of surfaces that share corners which is neither large nor a lamp, and the first such set that is a lamp.
+//! The difference is that of the mean irradiances of surface sides, Σ area |E − E'| / Σ area E'. [What is edited](kinds).
+
+mod kinds;
 
 use crate::BenchError;
 use crate::args::EditsArgs;
 use crate::curve::distance;
 use crate::measure::cpu_seconds;
 use crate::run::{Out, say};
-use glam::DVec3;
-use glossy_ext::GlossyField;
 use glossy_ext::haar::Refinement;
-use hr_diffuse::{Rgb, SceneInput, Settings, Shape, Solver, Surface};
+use glossy_ext::{GlossyField, Reflector};
+use hr_diffuse::{Rgb, SceneInput, Settings, Solver};
 use hr_scene::{Scene, builtin};
-use std::collections::HashMap;
+use kinds::{Edit, edits};
 use std::ops::ControlFlow;
 use std::sync::Arc;
-
-/// Things that are moved are no larger than this share of the scene, and move by so much of it.
-const LARGE: f64 = 0.5;
-const STEP: f64 = 0.05;
 
 /// A solver, and what it has taken so far.
 struct Run {
@@ -40,18 +37,22 @@ pub fn report(args: &EditsArgs, out: Out<'_>) -> Result<(), BenchError> {
     let pool = pool.map_err(|error| BenchError::Threads(error.to_string()))?;
     for name in names {
         let scene = Arc::new(Scene::load(name)?);
-        for (edit, input) in edits(&scene.input()) {
+        for edit in edits(&scene) {
             let run = || -> Result<String, BenchError> {
-                let fresh = solved(&scene, &input, args.error)?;
-                let mut run = solved(&scene, &scene.input(), args.error)?;
+                let reflectors = edit.reflectors.clone().unwrap_or_else(|| scene.reflectors());
+                let fresh = solved(&edit.input, &reflectors, args.error)?;
+                let mut run = solved(&scene.input(), &scene.reflectors(), args.error)?;
                 let before = (cpu_seconds(), run.solver.stats().rays);
-                run.solver.rearrange(&input, &mut |_| ControlFlow::Continue(()))?;
+                run.take(&edit)?;
                 let stats = run.solver.stats();
-                let renewed = 100.0 * stats.renewed_links as f64 / (stats.renewed_links + stats.kept_links) as f64;
+                let (renewed, kept) =
+                    if edit.moves { (stats.renewed_links, stats.kept_links) } else { (0, stats.links) };
+                let renewed = 100.0 * renewed as f64 / (renewed + kept) as f64;
                 let off = distance(&sides(&run.solver), &sides(&fresh.solver)) / f64::from(args.error);
                 Ok(format!(
-                    "| {} | {edit} | {renewed:.1} % | {} | {} | {:.3} | {:.3} | {off:.3} |",
+                    "| {} | {} | {renewed:.1} % | {} | {} | {:.3} | {:.3} | {off:.3} |",
                     scene.name,
+                    edit.name,
                     stats.rays - before.1,
                     fresh.rays,
                     cpu_seconds() - before.0,
@@ -65,10 +66,24 @@ pub fn report(args: &EditsArgs, out: Out<'_>) -> Result<(), BenchError> {
     Ok(())
 }
 
+impl Run {
+    /// Takes over an edit by what it needs and no more.
+    fn take(&mut self, edit: &Edit) -> Result<(), BenchError> {
+        let watch = &mut |_: &_| ControlFlow::Continue(());
+        if edit.moves {
+            self.solver.rearrange(&edit.input, watch)?;
+        } else {
+            let field = edit.reflectors.as_ref().map(|reflectors| GlossyField::new(reflectors, Refinement::default()));
+            self.solver.relight(&edit.input, field, watch)?;
+        }
+        Ok(())
+    }
+}
+
 /// Solves without values at vertices.
-fn solved(scene: &Arc<Scene>, input: &SceneInput, error: f32) -> Result<Run, BenchError> {
+fn solved(input: &SceneInput, reflectors: &[Arc<dyn Reflector>], error: f32) -> Result<Run, BenchError> {
     let before = cpu_seconds();
-    let field = GlossyField::new(&scene.reflectors(), Refinement::default());
+    let field = GlossyField::new(reflectors, Refinement::default());
     let mut solver = Solver::new(input, Settings::with_error(error), field)?;
     solver.solve(&mut |_| ControlFlow::Continue(()));
     let rays = solver.stats().rays;
@@ -85,111 +100,6 @@ fn sides(solver: &Solver<GlossyField>) -> Vec<(f64, Rgb)> {
     elements.surface_nodes.as_flattened().iter().map(side).collect()
 }
 
-/// Names of edits, and the scene after each.
-fn edits(input: &SceneInput) -> Vec<(&'static str, SceneInput)> {
-    let emits = |surface: &Surface| input.materials[surface.material as usize].exitance != Rgb::ZERO;
-    let all = bounds(input.surfaces.iter());
-    let size = (all[1] - all[0]).max_element();
-    let is_small = |thing: &&Vec<usize>| {
-        let [low, high] = bounds(thing.iter().map(|&surface| &input.surfaces[surface]));
-        (high - low).max_element() < LARGE * size
-    };
-    let things = things(&input.surfaces);
-    let mut edits = Vec::new();
-    // Toward the middle of the scene, along the floor or the ceiling.
-    let step = |from: DVec3| {
-        let to = (0.5 * (all[0] + all[1]) - from) * least_out(all);
-        to.try_normalize().unwrap_or(DVec3::X) * (STEP * size)
-    };
-    for (name, lamp) in [("moved object", false), ("moved lamp", true)] {
-        let found =
-            things.iter().filter(is_small).find(|thing| thing.iter().any(|&s| emits(&input.surfaces[s])) == lamp);
-        let mut moved = input.clone();
-        if let Some(thing) = found {
-            let [low, high] = bounds(thing.iter().map(|&surface| &input.surfaces[surface]));
-            let by = step(0.5 * (low + high));
-            thing.iter().for_each(|&surface| shift(&mut moved.surfaces[surface].shape, by));
-        } else if let Some(light) = moved.lights.first_mut().filter(|_| lamp) {
-            light.position += step(light.position);
-        } else {
-            continue;
-        }
-        edits.push((name, moved));
-    }
-    edits
-}
-
-/// 0 along the axis along which the scene is lowest, where things stand, and 1 along the others.
-fn least_out([low, high]: [DVec3; 2]) -> DVec3 {
-    let size = high - low;
-    let least = size.min_element();
-    let mut kept = DVec3::ONE;
-    let axis = (0..3).find(|&axis| size[axis] <= least).unwrap_or(2);
-    kept[axis] = 0.0;
-    kept
-}
-
-/// Surfaces that share corners, as sets in order of their first ones.
-fn things(surfaces: &[Surface]) -> Vec<Vec<usize>> {
-    let mut first: Vec<usize> = (0..surfaces.len()).collect();
-    fn root(first: &mut [usize], mut of: usize) -> usize {
-        while first[of] != of {
-            first[of] = first[first[of]];
-            of = first[of];
-        }
-        of
-    }
-    let mut owner: HashMap<[u64; 3], usize> = HashMap::new();
-    for (surface, of) in surfaces.iter().enumerate() {
-        for corner in corners(&of.shape) {
-            let other = *owner.entry(corner.to_array().map(f64::to_bits)).or_insert(surface);
-            let (a, b) = (root(&mut first, surface), root(&mut first, other));
-            first[a.max(b)] = a.min(b);
-        }
-    }
-    let mut sets: Vec<Vec<usize>> = vec![Vec::new(); surfaces.len()];
-    for surface in 0..surfaces.len() {
-        sets[root(&mut first, surface)].push(surface);
-    }
-    sets.retain(|set| !set.is_empty());
-    sets
-}
-
-/// Corners of polygons, by which they hang together.
-fn corners(shape: &Shape) -> &[DVec3] {
-    match shape {
-        Shape::Triangle(corners) => corners,
-        Shape::Quad(corners) => corners,
-        _ => &[],
-    }
-}
-
-fn bounds<'a>(surfaces: impl Iterator<Item = &'a Surface>) -> [DVec3; 2] {
-    let mut bounds = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    let mut add = |at: DVec3, reach: f64| {
-        bounds = [bounds[0].min(at - reach), bounds[1].max(at + reach)];
-    };
-    for surface in surfaces {
-        match &surface.shape {
-            Shape::Sphere { center, radius } => add(*center, *radius),
-            Shape::Cone { ends, radii } => ends.iter().zip(radii).for_each(|(end, radius)| add(*end, *radius)),
-            Shape::Ring { center, outer, .. } => add(*center, *outer),
-            Shape::Torus { center, major, minor, .. } => add(*center, major + minor),
-            polygon => corners(polygon).iter().for_each(|corner| add(*corner, 0.0)),
-        }
-    }
-    bounds
-}
-
-fn shift(shape: &mut Shape, by: DVec3) {
-    match shape {
-        Shape::Triangle(corners) => corners.iter_mut().for_each(|corner| *corner += by),
-        Shape::Quad(corners) => corners.iter_mut().for_each(|corner| *corner += by),
-        Shape::Cone { ends, .. } => ends.iter_mut().for_each(|end| *end += by),
-        Shape::Sphere { center, .. } | Shape::Ring { center, .. } | Shape::Torus { center, .. } => *center += by,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -201,7 +111,7 @@ mod tests {
         report(&args, &mut said).expect("sound");
         let said = String::from_utf8(said).expect("text");
         let rows: Vec<Vec<&str>> = said.lines().skip(2).map(|line| line.split('|').map(str::trim).collect()).collect();
-        assert_eq!(rows.len(), 2, "an object and a lamp: {said}");
+        assert_eq!(rows.len(), 5, "light, paint, an object and a lamp: {said}");
         for row in rows {
             assert_eq!(row.len(), 10, "as many columns everywhere: {said}");
             let difference: f64 = row[8].parse().expect("a number");

@@ -1,8 +1,8 @@
 //! Changes of materials while one looks at them.
 
+use crate::{Material, Rgb};
 use glam::Vec3;
 use glossy_ext::Ward;
-use hr_scene::{Material, Rgb};
 use std::f32::consts::SQRT_2;
 use std::sync::Arc;
 
@@ -14,8 +14,11 @@ const MOST_ALPHA: f32 = 0.8;
 /// The direction that a lobe's width is taken for.
 const ASLANT: Vec3 = Vec3::new(0.6, 0.0, 0.8);
 
-/// A material that shines so many times as much; what is said about it.
-pub(crate) fn brightened(material: &mut Material, factor: f32) -> Result<String, String> {
+/// Lets a material shine `factor` times as much (> 0). Tells in one line what it is now.
+///
+/// # Errors
+/// One line on why it stays as it is: it does not shine, or would by far too much or too little.
+pub fn brightened(material: &mut Material, factor: f32) -> Result<String, String> {
     if material.exitance == Rgb::ZERO {
         return Err(format!("'{}' does not shine", material.name));
     }
@@ -27,9 +30,12 @@ pub(crate) fn brightened(material: &mut Material, factor: f32) -> Result<String,
     Ok(format!("'{}' emits {:.3} {:.3} {:.3} W/m² now", material.name, exitance.x, exitance.y, exitance.z))
 }
 
-/// A material whose gloss is so many times as wide, as Ward's reflector: it takes the place of any other; what is said
-/// about it.
-pub(crate) fn roughened(material: &mut Material, factor: f32) -> Result<String, String> {
+/// Makes a material's gloss `factor` times as wide (> 0), as Ward's reflector of the same albedo, which takes the place of any
+/// other. Tells in one line what it is now.
+///
+/// # Errors
+/// One line on why it stays as it is: it has no gloss, is a perfect mirror, or has a texture.
+pub fn roughened(material: &mut Material, factor: f32) -> Result<String, String> {
     let reflector = &material.reflector;
     let (diffuse, glossy) = (reflector.diffuse(), reflector.glossy_albedo().max(Rgb::ZERO));
     if reflector.is_diffuse() || reflector.mirror() != Rgb::ZERO || material.texture.is_some() {

@@ -3,6 +3,7 @@
 pub mod builtin;
 pub mod camera;
 pub mod color;
+pub mod edits;
 pub mod error;
 pub mod film;
 mod fingerprint;

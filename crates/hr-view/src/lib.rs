@@ -5,7 +5,6 @@ pub mod args;
 pub mod at_pixels;
 pub mod camera_path;
 pub mod display;
-mod edits;
 pub mod error;
 pub mod export;
 pub mod facets;

@@ -7,7 +7,6 @@
 
 use crate::args::Args;
 use crate::camera_path::CameraPath;
-use crate::edits::{brightened, roughened};
 use crate::error::ViewError;
 use crate::glossy::Mode;
 use crate::interrupt::{Interrupt, STOPPING};
@@ -20,6 +19,7 @@ use crate::walkthrough::Walkthrough;
 use crate::watched::Watched;
 use crate::window::{self, Screen, Status, WindowOptions, Wish};
 use hr_diffuse::{Budget, Phase, Settings};
+use hr_scene::edits::{brightened, roughened};
 use hr_scene::{Material, Rgb, Scene};
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
