@@ -50,6 +50,31 @@ fn glossy_paint_and_lamps_can_be_edited() {
     assert!(off < 0.5 * ERROR, "off by {off}");
 }
 
+/// What all lamps together emit more or less is expected everywhere, and what arrives is sent on in proportion: that of a single lamp
+/// shows where leaves have to be reflected anew, and those are few.
+#[test]
+fn dimming_lamps_reflects_few_leaves_anew() {
+    const BAR: u64 = 20;
+    let mut room = Room::new();
+    let mut solver = solved(&room);
+    let reflected = |solver: &Solver<GlossyField>| solver.field().counters().brdf_evaluations();
+    let first = reflected(&solver);
+    let mut share_of = |room: &Room| {
+        let before = reflected(&solver);
+        solver.relight(&room.input, None, &mut |_| ControlFlow::Continue(())).expect("links serve for it");
+        let off = difference(&fronts(&solver), &fronts(&solved(room)));
+        assert!(off < 0.5 * ERROR, "off by {off}");
+        100 * (reflected(&solver) - before) / first
+    };
+    let color = Rgb::new(0.3, 0.6, 0.9);
+    room.input.materials.iter_mut().for_each(|material| material.exitance *= color);
+    room.input.lights[0].intensity *= color;
+    assert_eq!(share_of(&room), 0, "percent of what the solve reflected, for all lamps in another colour");
+    room.input.lights[0].intensity *= 0.5;
+    let one = share_of(&room);
+    assert!(one < BAR, "{one} % of what the solve reflected, for a single lamp");
+}
+
 #[test]
 fn glossy_lamps_can_be_mixed() {
     let mut room = Room::new();

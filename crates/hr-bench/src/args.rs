@@ -212,6 +212,10 @@ pub struct EditsArgs {
     /// Error to ask for
     #[arg(long, value_name = "E", default_value_t = 0.05)]
     pub error: f32,
+
+    /// Only these edits: intensity, colour, reflectance, roughness, object, lamp
+    #[arg(long, value_name = "EDIT,EDIT,...", value_delimiter = ',')]
+    pub only: Vec<String>,
 }
 
 /// Of `hr-bench transport`.

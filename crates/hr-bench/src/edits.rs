@@ -13,13 +13,19 @@ use glossy_ext::haar::Refinement;
 use glossy_ext::{GlossyField, Reflector};
 use hr_diffuse::{Rgb, SceneInput, Settings, Solver};
 use hr_scene::{Scene, builtin};
-use kinds::{Edit, edits};
+use kinds::{Edit, How, dimmed, edits};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// A solver, and what it has taken so far.
+/// A solver, and what it has taken to solve.
 struct Run {
     solver: Solver<GlossyField>,
+    cost: Cost,
+}
+
+/// Seconds of processor time, and rays.
+#[derive(Clone, Copy)]
+struct Cost {
     cpu: f64,
     rays: u64,
 }
@@ -37,26 +43,22 @@ pub fn report(args: &EditsArgs, out: Out<'_>) -> Result<(), BenchError> {
     let pool = pool.map_err(|error| BenchError::Threads(error.to_string()))?;
     for name in names {
         let scene = Arc::new(Scene::load(name)?);
-        for edit in edits(&scene) {
+        let asked =
+            |edit: &Edit| args.only.is_empty() || args.only.iter().any(|name| edit.name.ends_with(name.as_str()));
+        for edit in edits(&scene).into_iter().filter(asked) {
             let run = || -> Result<String, BenchError> {
                 let reflectors = edit.reflectors.clone().unwrap_or_else(|| scene.reflectors());
                 let fresh = solved(&edit.input, &reflectors, args.error)?;
                 let mut run = solved(&scene.input(), &scene.reflectors(), args.error)?;
-                let before = (cpu_seconds(), run.solver.stats().rays);
-                run.take(&edit)?;
+                let cost = run.take(&edit)?;
                 let stats = run.solver.stats();
                 let (renewed, kept) =
-                    if edit.moves { (stats.renewed_links, stats.kept_links) } else { (0, stats.links) };
+                    if edit.how == How::Rearrange { (stats.renewed_links, stats.kept_links) } else { (0, stats.links) };
                 let renewed = 100.0 * renewed as f64 / (renewed + kept) as f64;
                 let off = distance(&sides(&run.solver), &sides(&fresh.solver)) / f64::from(args.error);
                 Ok(format!(
                     "| {} | {} | {renewed:.1} % | {} | {} | {:.3} | {:.3} | {off:.3} |",
-                    scene.name,
-                    edit.name,
-                    stats.rays - before.1,
-                    fresh.rays,
-                    cpu_seconds() - before.0,
-                    fresh.cpu
+                    scene.name, edit.name, cost.rays, fresh.cost.rays, cost.cpu, fresh.cost.cpu
                 ))
             };
             let row = pool.install(run)?;
@@ -67,16 +69,21 @@ pub fn report(args: &EditsArgs, out: Out<'_>) -> Result<(), BenchError> {
 }
 
 impl Run {
-    /// Takes over an edit by what it needs and no more.
-    fn take(&mut self, edit: &Edit) -> Result<(), BenchError> {
-        let watch = &mut |_: &_| ControlFlow::Continue(());
-        if edit.moves {
-            self.solver.rearrange(&edit.input, watch)?;
-        } else {
-            let field = edit.reflectors.as_ref().map(|reflectors| GlossyField::new(reflectors, Refinement::default()));
-            self.solver.relight(&edit.input, field, watch)?;
+    /// Takes over an edit by what it needs and no more. The light of each lamp is no part of what it costs to mix them.
+    fn take(&mut self, edit: &Edit) -> Result<Cost, BenchError> {
+        let (solver, watch) = (&mut self.solver, &mut |_: &_| ControlFlow::Continue(()));
+        let lamps = solver.lamps();
+        let variants = if edit.how == How::Mix { Some(solver.each_lamp(&lamps, watch)?) } else { None };
+        let colors: Vec<Rgb> = (0..lamps.len()).map(dimmed).collect();
+        let field = edit.reflectors.as_ref().map(|reflectors| GlossyField::new(reflectors, Refinement::default()));
+        let (cpu, rays) = (cpu_seconds(), solver.stats().rays);
+        match (edit.how, variants) {
+            (How::Rearrange, _) => solver.rearrange(&edit.input, watch)?,
+            (How::EachLamp, _) => drop(solver.each_lamp(&lamps, watch)?),
+            (How::Mix, Some(variants)) => solver.mix(&variants, &colors, watch)?,
+            _ => solver.relight(&edit.input, field, watch)?,
         }
-        Ok(())
+        Ok(Cost { cpu: cpu_seconds() - cpu, rays: solver.stats().rays - rays })
     }
 }
 
@@ -87,7 +94,7 @@ fn solved(input: &SceneInput, reflectors: &[Arc<dyn Reflector>], error: f32) -> 
     let mut solver = Solver::new(input, Settings::with_error(error), field)?;
     solver.solve(&mut |_| ControlFlow::Continue(()));
     let rays = solver.stats().rays;
-    Ok(Run { solver, cpu: cpu_seconds() - before, rays })
+    Ok(Run { solver, cost: Cost { cpu: cpu_seconds() - before, rays } })
 }
 
 /// Area and mean irradiance of all sides of surfaces, those without elements as dark ones.
@@ -106,12 +113,12 @@ mod tests {
 
     #[test]
     fn edits_are_measured_and_right() {
-        let args = EditsArgs { scenes: vec!["cornell".into()], error: 0.3 };
+        let args = EditsArgs { scenes: vec!["cornell".into()], error: 0.3, only: Vec::new() };
         let mut said = Vec::new();
         report(&args, &mut said).expect("sound");
         let said = String::from_utf8(said).expect("text");
         let rows: Vec<Vec<&str>> = said.lines().skip(2).map(|line| line.split('|').map(str::trim).collect()).collect();
-        assert_eq!(rows.len(), 5, "light, paint, an object and a lamp: {said}");
+        assert_eq!(rows.len(), 7, "light, paint, an object and a lamp: {said}");
         for row in rows {
             assert_eq!(row.len(), 10, "as many columns everywhere: {said}");
             let difference: f64 = row[8].parse().expect("a number");

@@ -8,7 +8,6 @@
 use crate::Rgb;
 use crate::hooks::LightField;
 use crate::links::Links;
-use crate::threads::prelude::*;
 use crate::transport::Light;
 
 /// Of what a leaf does not reflect diffusely, links may carry so much as directional light at first. What the links of a
@@ -17,27 +16,19 @@ pub(crate) const FREELY: f32 = 1.4;
 /// With this, light dies out in any scene.
 pub(crate) const STRICTLY: f32 = 0.9;
 
-/// By node: the factor, at most 1, for the directional light of all its links, which was made of this irradiance of leaves. `lit`
-/// is the area that each link lights, times what lets its light through; `most`, by leaf, what its links may carry.
+/// By node: the factor, at most 1, for the directional light of all its links, which was made of this irradiance of leaves. `directional` is
+/// the light that each asks for, `lit` the area that each link lights, times what lets its light through; `most`, by leaf, what its links may carry.
 pub(crate) fn gains<L: LightField>(
     light: Light<'_, L>,
     links: &Links,
-    lit: &[f32],
+    (directional, lit): (&[Rgb], &[f32]),
     most: &[f32],
     irradiance: &[Rgb],
 ) -> Vec<f32> {
     let nodes = &light.elements.nodes;
     let mut carried = vec![0.0_f32; nodes.len()];
-    let powers = links.all().par_iter().zip(lit).with_min_len(256).map(|(link, lit)| {
-        if !light.element(link.sender).active {
-            return 0.0;
-        }
-        let power = light.directional_toward(link.sender, link.receiver).max(Rgb::ZERO).element_sum();
-        power * link.factor * lit
-    });
-    let powers: Vec<f32> = powers.collect();
-    for (link, power) in links.all().iter().zip(powers) {
-        carried[link.sender as usize] += power;
+    for ((link, directional), lit) in links.all().iter().zip(directional).zip(lit) {
+        carried[link.sender as usize] += directional.max(Rgb::ZERO).element_sum() * link.factor * lit;
     }
     // What each node has, from its leaves up.
     let mut power = vec![0.0_f32; nodes.len()];

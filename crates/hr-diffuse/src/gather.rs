@@ -85,6 +85,9 @@ pub(crate) struct Gather {
     /// By link: the area that it lights, times what lets its light through, all places together. Where an extension takes part, else
     /// nothing.
     lit: Vec<f32>,
+    /// By link, [`directional_toward`](Light::directional_toward) its receiver, as long as its sender sends the same. Where an extension
+    /// takes part, else nothing.
+    directional: Vec<Rgb>,
     /// Irradiance by link.
     arriving: Vec<Rgb>,
 }
@@ -118,7 +121,7 @@ impl Gather {
             if closed { Vec3::from(slope) / rest } else { Vec3::ZERO }
         };
         let tilts = slopes.into_iter().zip(push.places.joined()).map(tilt).collect();
-        let mut gather = Self { groups, push, rows, tilts, lit: Vec::new(), arriving: Vec::new() };
+        let mut gather = Self { groups, push, rows, tilts, ..Self::default() };
         if light.element(0).active {
             gather.lit = gather.lit_areas(light, links);
         }
@@ -160,8 +163,7 @@ impl Gather {
     /// By leaf, what arrives there of light that has been reflected (sum of channels).
     pub(crate) fn indirect<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
         let shares = light.reflected_shares();
-        let indirect =
-            |link: &Link, spread| carried(light, link, spread, None).element_sum() * shares[link.sender as usize];
+        let indirect = |link: &Link, spread| carried(light, link, spread).element_sum() * shares[link.sender as usize];
         let on_leaves = self.on_leaves(light, links, &self.carried(links, indirect));
         on_leaves.into_iter().map(|(leaf, indirect)| (leaf, indirect.max(0.0))).collect()
     }
@@ -170,7 +172,7 @@ impl Gather {
     fn reflected<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<f32> {
         let shares = light.reflected_shares();
         self.by_place(light, links, |link, spread| {
-            carried(light, link, spread, None).element_sum() * shares[link.sender as usize]
+            carried(light, link, spread).element_sum() * shares[link.sender as usize]
         })
     }
 
@@ -305,9 +307,48 @@ impl Gather {
         self.push.rays
     }
 
-    /// Bytes of the weights that are kept.
-    pub(crate) fn weight_bytes(&self) -> u64 {
-        self.push.weight_bytes()
+    /// Bytes of what is kept and can be had anew: weights, and what links carry of an extension's light.
+    pub(crate) fn kept_bytes(&self) -> u64 {
+        self.push.weight_bytes() + size_of_val(self.directional.as_slice()) as u64
+    }
+
+    /// Forgets what senders send: they send something else now.
+    pub(crate) fn forget_directional(&mut self) {
+        self.directional.clear();
+    }
+
+    /// By link, what its sender sends of an extension's light.
+    pub(crate) fn directional(&self) -> &[Rgb] {
+        &self.directional
+    }
+
+    /// Asks senders what they send over their links: all of them where it is not known for these links, else those that
+    /// send something else now. Returns the number of links over which they need not be asked.
+    pub(crate) fn ask<L: LightField>(
+        &mut self,
+        light: Light<'_, L>,
+        links: &Links,
+        sends_else: impl Fn(u32) -> bool + Sync,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<(), u64> {
+        if !light.element(0).active {
+            return ControlFlow::Continue(0);
+        }
+        let knows = self.directional.len() == links.all().len();
+        self.directional.resize(links.all().len(), Rgb::ZERO);
+        let chunk = BETWEEN_WATCHES / 16 * threads::current_num_threads();
+        for (directional, links) in self.directional.chunks_mut(chunk).zip(links.all().chunks(chunk)) {
+            if watch().is_break() {
+                self.forget_directional();
+                return ControlFlow::Break(());
+            }
+            let asked = directional.par_iter_mut().zip(links).with_min_len(64);
+            asked.filter(|(_, link)| !knows || sends_else(link.sender)).for_each(|(directional, link)| {
+                *directional = light.directional_toward(link.sender, link.receiver);
+            });
+        }
+        let steady = |link: &&Link| knows && light.element(link.sender).active && !sends_else(link.sender);
+        ControlFlow::Continue(links.all().iter().filter(steady).count() as u64)
     }
 
     /// Evaluates all links, of those that `shot` says only for what has not been shot yet, and lets the extension receive what
@@ -321,15 +362,18 @@ impl Gather {
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let chunk = BETWEEN_WATCHES * threads::current_num_threads();
+        self.ask(light, links, |_| false, watch)?;
         let mut arriving = std::mem::take(&mut self.arriving);
         arriving.resize(links.all().len(), Rgb::ZERO);
-        let parts = links.all().chunks(chunk).zip(self.push.spreads.chunks(chunk));
-        for (irradiances, (links, spreads)) in arriving.chunks_mut(chunk).zip(parts) {
+        for (i, irradiances) in arriving.chunks_mut(chunk).enumerate() {
             if watch().is_break() {
                 return ControlFlow::Break(());
             }
-            let evaluated = irradiances.par_iter_mut().zip(links).zip(spreads).with_min_len(256);
-            evaluated.for_each(|((irradiance, link), spread)| *irradiance = carried(light, link, *spread, shot));
+            irradiances.par_iter_mut().enumerate().with_min_len(256).for_each(|(j, irradiance)| {
+                let at = i * chunk + j;
+                let directional = self.directional.get(at).copied().unwrap_or_default();
+                *irradiance = passed(light, &links.all()[at], (self.push.spreads[at], directional), shot);
+            });
         }
         self.arriving = arriving;
         self.receive(light, links, &self.arriving, incident, watch)
@@ -385,15 +429,25 @@ impl Gather {
     }
 }
 
-/// Irradiance that a link carries, or what it carries of light that has not been shot yet.
-pub(crate) fn carried<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread, shot: Option<&Shot>) -> Rgb {
+/// Irradiance that a link carries.
+pub(crate) fn carried<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spread) -> Rgb {
+    passed(light, link, (spread, light.directional_toward(link.sender, link.receiver)), None)
+}
+
+/// The same where the sender's directional light is known, or what it carries of light that has not been shot yet.
+fn passed<L: LightField>(
+    light: Light<'_, L>,
+    link: &Link,
+    (spread, directional): (Spread, Rgb),
+    shot: Option<&Shot>,
+) -> Rgb {
     let visible = link.factor * visible(link, spread);
     if visible <= 0.0 || shot.is_some_and(|shot| !shot.shoots[link.sender as usize]) {
         return Rgb::ZERO;
     }
     let direction = light.direction_to(light.element(link.receiver).center, link.sender);
     let before = shot.map_or(Rgb::ZERO, |shot| shot.emitted(light, link.sender, -direction));
-    (light.emitted_toward(link) - before) * visible
+    (light.emitted_with(link, directional) - before) * visible
 }
 
 /// What a link carries of unit radiosity, from senders that have any.

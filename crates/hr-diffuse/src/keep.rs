@@ -349,7 +349,7 @@ impl Vertices {
 
 impl Stats {
     /// All counters, in the order in which they are kept.
-    fn counters(&mut self) -> [&mut u64; 23] {
+    fn counters(&mut self) -> [&mut u64; 24] {
         let Self {
             polygons,
             nodes,
@@ -380,6 +380,7 @@ impl Stats {
             proved_blocked,
             sealed_sides,
             converged_leaves,
+            steady_senders,
             faint_links,
             inner_vertices,
             joined_leaves,
@@ -405,6 +406,7 @@ impl Stats {
             proved_blocked,
             sealed_sides,
             converged_leaves,
+            steady_senders,
             faint_links,
             inner_vertices,
             joined_leaves,
@@ -428,7 +430,7 @@ impl Stats {
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
         let mut stats = Self::default();
-        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 23>(WHAT)?) {
+        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 24>(WHAT)?) {
             *counter = kept;
         }
         let [iterations, stopped, spent] = from.take_exactly::<u64, 3>(WHAT)?;

@@ -54,6 +54,7 @@ pub mod sampling;
 pub mod scene;
 mod sealed;
 mod segments;
+mod sent;
 mod shadows;
 mod shooting;
 mod sides;

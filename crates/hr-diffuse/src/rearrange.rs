@@ -17,6 +17,7 @@ use crate::links::Links;
 use crate::moved::{Moved, is_within_reach};
 use crate::refine::Pair;
 use crate::renewal::{Renewal, renewal};
+use crate::sent::Sent;
 use crate::solver::{Progress, Solver, scene_in};
 use crate::{Facing, Rgb, SceneInput};
 use std::mem::discriminant;
@@ -117,9 +118,7 @@ impl<L: LightField> Solver<L> {
         make_room(&mut self.incident, L::Incident::default);
         make_room(&mut self.reflected, L::Exitant::default);
         make_room(&mut self.brightest, || 0.0);
-        make_room(&mut self.last_reflected, || Rgb::ZERO);
-        make_room(&mut self.last_negligible, || 0.0);
-        make_room(&mut self.strengths, || 1.0);
+        make_room(&mut self.sent, || Sent::NOTHING);
         let count = self.elements.nodes.len();
         let exitant = &mut self.exitant;
         exitant.reflected_as.extend(exitant.reflected_as.len() as u32..count as u32);

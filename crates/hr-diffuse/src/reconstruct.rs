@@ -349,7 +349,7 @@ fn inherited<L: LightField>(
         if !is_inherited(light, link.receiver, spread) {
             return Brought::default();
         }
-        let irradiance = carried(light, link, spread, None);
+        let irradiance = carried(light, link, spread);
         let indirect = irradiance.element_sum() * shares[link.sender as usize];
         Brought { irradiance, share: share(light, link, spread), indirect }
     };

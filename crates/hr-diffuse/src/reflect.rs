@@ -10,6 +10,7 @@ use crate::hierarchy::Elements;
 use crate::hooks::{Arrived, LightField, NodeId};
 use crate::links::Links;
 use crate::sampling::{hash, unit};
+use crate::sent::Sent;
 use crate::shooting::NEW_SHARE;
 use crate::solver::{Phase, Progress, Solver};
 use crate::threads::{self, prelude::*};
@@ -44,6 +45,19 @@ const FINER: f32 = 0.5;
 /// Leaves that a thread reflects between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 8;
 
+/// What becomes of an extension's light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reflect {
+    /// It stays as it is.
+    Not,
+    /// Leaves send what they reflected in proportion to what arrives now.
+    InProportion,
+    /// Leaves that send something else by now are reflected anew, too.
+    Reshaped,
+    /// Leaves at which what arrives has changed by the error asked for are.
+    Changed,
+}
+
 /// Leaves, and the area that each stands for.
 type Areas = SmallVec<[(u32, f32); 16]>;
 
@@ -55,8 +69,8 @@ pub struct Representative {
     pub leaf: u32,
     /// The share of the sender's area that it stands for.
     pub share: f32,
-    /// How many times as much light arrives at it as when it was reflected: it sends so many times as much.
-    pub strength: f32,
+    /// It sends so many times as much as was reflected when it was reflected last: as much more as arrives.
+    pub strength: Rgb,
 }
 
 /// Whose directional light the links ask for: for each node the leaves that stand for it.
@@ -109,8 +123,11 @@ impl Senders {
             }
             if sends[node] {
                 let first = senders.standing.len() as u32;
-                let representative =
-                    |&(leaf, area): &(u32, f32)| Representative { leaf, share: area / element.area, strength: 1.0 };
+                let representative = |&(leaf, area): &(u32, f32)| Representative {
+                    leaf,
+                    share: area / element.area,
+                    strength: Rgb::ONE,
+                };
                 senders.standing.extend(standing[node].iter().map(representative));
                 senders.ranges[node] = [first, senders.standing.len() as u32];
             }
@@ -191,28 +208,39 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Reflects light that arrived at senders, until `watch` breaks: all of it where it has changed, or what is new.
-    pub(crate) fn reflect_senders(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) {
+    pub(crate) fn reflect_senders(&mut self, how: Reflect, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         self.shown.clear();
-        if !self.elements.nodes[0].active {
+        if how == Reflect::Not || !self.elements.nodes[0].active {
             return;
         }
         let shot = self.shot.take();
         let new = shot.as_ref().map(|shot| shot.new.as_slice());
-        if self.reflect_standing(new, watch) {
+        let (changed, sends_else) = self.reflect_standing(new, how, watch);
+        let mut gather = std::mem::take(&mut self.gather);
+        let asked = gather.ask(self.light(), &self.links, |sender| sends_else[sender as usize], watch);
+        if let ControlFlow::Continue(steady) = asked {
+            self.stats.skipped.steady_senders += steady;
+        }
+        if changed && asked.is_continue() {
             let irradiance = new.unwrap_or(&self.exitant.irradiance);
             self.feedback.fit(self.elements.nodes.len());
-            self.exitant.gain = gains(self.light(), &self.links, self.lit(), self.feedback.most(), irradiance);
+            let carried = (gather.directional(), gather.lit());
+            self.exitant.gain = gains(self.light(), &self.links, carried, self.feedback.most(), irradiance);
         }
-        self.shot = shot;
+        (self.gather, self.shot) = (gather, shot);
     }
 
     /// Reflects the light of the leaves that stand for what the links ask for, where it has changed, or `new` light (by
-    /// leaf) in the place of what they reflected before; until `watch` breaks. Tells whether any has.
-    fn reflect_standing(&mut self, new: Option<&[Rgb]>, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
+    /// leaf) in the place of what they reflected before; until `watch` breaks. Tells whether any has, and by node whether
+    /// it sends something else now.
+    fn reflect_standing(
+        &mut self,
+        new: Option<&[Rgb]>,
+        how: Reflect,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> (bool, Vec<bool>) {
         let count = self.elements.nodes.len();
-        self.last_reflected.resize(count, Rgb::splat(f32::NEG_INFINITY));
-        self.last_negligible.resize(count, 0.0);
-        self.strengths.resize(count, 1.0);
+        self.sent.resize(count, Sent::NOTHING);
         self.brightest.resize(count, 0.0);
         let (elements, faint) = (&self.elements, &self.faint);
         // What is pure metal has no diffuse light, and gets no links while it is dark: it is lit now.
@@ -233,37 +261,44 @@ impl<L: LightField> Solver<L> {
                 self.brightest[leaf as usize] = 0.0;
             }
         }
-        let changed = self.reflect(&leaves, new, watch);
+        let changed = self.reflect(&leaves, new, how, watch);
         let mut stands = vec![false; count];
         for standing in leaves {
             stands[standing.leaf as usize] = true;
         }
         for (node, stands) in stands.into_iter().enumerate() {
-            if !stands && self.last_reflected[node] != Rgb::splat(f32::NEG_INFINITY) {
+            if !stands && self.sent[node].is_known() {
                 self.reflected[node] = L::Exitant::default();
-                self.last_reflected[node] = Rgb::splat(f32::NEG_INFINITY);
+                self.sent[node] = Sent::NOTHING;
             }
         }
         if new.is_none() {
-            senders.standing.iter_mut().for_each(|standing| standing.strength = self.strength(standing.leaf));
+            // Light rises until it has settled: steps of all of the error would leave what is sent behind what arrives, bounce by bounce.
+            let step = STRENGTH_STEP * self.settings.error;
+            for Representative { leaf, strength, .. } in &mut senders.standing {
+                *strength = self.sent[*leaf as usize].follow(self.exitant.irradiance[*leaf as usize], step);
+            }
         }
-        self.exitant.senders = senders;
+        let before = (std::mem::replace(&mut self.exitant.senders, senders), self.exitant.reflected_as.clone());
         self.refer(&changed);
-        !changed.is_empty()
+        let all = new.is_some() || !self.skips.steady_senders;
+        let sends_else = if all { vec![true; count] } else { self.sends_else(&before, &changed) };
+        (!changed.is_empty(), sends_else)
     }
 
-    /// How many times as much light arrives at a leaf as when it was reflected, in steps.
-    fn strength(&mut self, leaf: u32) -> f32 {
-        let [now, last] = [&self.exitant.irradiance, &self.last_reflected].map(|of| of[leaf as usize].element_sum());
-        let (strength, before) = (now / last, &mut self.strengths[leaf as usize]);
-        // Light rises until it has settled: steps of all of the error would leave what is sent behind what arrives, bounce by bounce.
-        if last > 0.0
-            && strength.is_finite()
-            && (strength - *before).abs() > STRENGTH_STEP * self.settings.error * *before
-        {
-            *before = strength;
-        }
-        *before
+    /// By node, whether it sends something else than `before`, as other leaves stand for it, they have changed, or shine otherwise.
+    fn sends_else(&self, (senders, reflected_as): &(Senders, Vec<u32>), changed: &[u32]) -> Vec<bool> {
+        let mut has_changed = vec![false; self.elements.nodes.len()];
+        changed.iter().for_each(|&leaf| has_changed[leaf as usize] = true);
+        let now = &self.exitant;
+        let states: Vec<bool> = (0..has_changed.len() as u32)
+            .map(|node| {
+                let standing = now.senders.of(node);
+                standing != senders.of(node) || standing.iter().any(|standing| has_changed[standing.leaf as usize])
+            })
+            .collect();
+        let differs = |(node, state): (usize, &u32)| reflected_as.get(node) != Some(state) || states[*state as usize];
+        now.reflected_as.iter().enumerate().map(differs).collect()
     }
 
     /// Finds out which differences of the light of leaves are too small for any link to tell: what a link makes of them counts
@@ -306,7 +341,8 @@ impl<L: LightField> Solver<L> {
         for node in 0..self.elements.nodes.len() {
             let standing = self.exitant.senders.of(node as u32);
             let parent = self.elements.nodes[node].parent as usize;
-            let brightest = |of: &Representative| self.brightest[of.leaf as usize] * of.share * of.strength;
+            let brightest =
+                |of: &Representative| self.brightest[of.leaf as usize] * of.share * of.strength.max_element();
             self.exitant.peak[node] = standing.iter().map(brightest).sum();
             self.exitant.reflected_as[node] =
                 if standing.is_empty() && node > 0 { self.exitant.reflected_as[parent] } else { node as u32 };
@@ -319,24 +355,27 @@ impl<L: LightField> Solver<L> {
         &mut self,
         leaves: &[Standing],
         new: Option<&[Rgb]>,
+        how: Reflect,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Vec<u32> {
+        if new.is_none() && matches!(how, Reflect::Not | Reflect::InProportion) {
+            return Vec::new();
+        }
         let settled = SETTLED_SHARE * self.settings.error;
-        let tolerance = match new {
-            Some(_) => NEW_SHARE * self.settings.error,
-            None if self.reflects_finely => settled,
-            None => settled.max(RESHAPED),
+        let tolerance = match (new, how) {
+            (Some(_), _) => NEW_SHARE * self.settings.error,
+            (None, Reflect::Changed) => settled,
+            (None, _) => settled.max(RESHAPED),
         };
         let mut changed: Vec<Standing> = leaves
             .iter()
             .copied()
             .filter(|&Standing { leaf, negligible, .. }| {
-                let now = self.exitant.irradiance[leaf as usize];
-                let change = new.map_or_else(|| now - self.last_reflected[leaf as usize], |new| new[leaf as usize]);
-                let change = change.abs().max_element();
+                let (now, sent) = (self.exitant.irradiance[leaf as usize], self.sent[leaf as usize]);
+                let change = new.map_or_else(|| sent.change(now), |new| new[leaf as usize].abs().max_element());
                 !self.skips.converged_leaves
                     || change > tolerance * now.max_element()
-                    || negligible < FINER * self.last_negligible[leaf as usize]
+                    || negligible < FINER * sent.negligible()
             })
             .collect();
         self.stats.skipped.converged_leaves += (leaves.len() - changed.len()) as u64;
@@ -344,9 +383,7 @@ impl<L: LightField> Solver<L> {
         changed.truncate(exitant.len());
         for (Standing { leaf, negligible, .. }, exitant) in changed.iter().zip(exitant) {
             self.reflected[*leaf as usize] = exitant;
-            self.last_negligible[*leaf as usize] = *negligible;
-            self.last_reflected[*leaf as usize] = self.exitant.irradiance[*leaf as usize];
-            self.strengths[*leaf as usize] = 1.0;
+            self.sent[*leaf as usize] = Sent::of(self.exitant.irradiance[*leaf as usize], *negligible);
         }
         changed.into_iter().map(|standing| standing.leaf).collect()
     }

@@ -8,12 +8,14 @@
 //! will be, and nothing is darker than it will be; what has no links at all because it was black or dark is refused.
 
 use crate::error::SolveError;
-use crate::hierarchy::Elements;
+use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
+use crate::sent::Sent;
 use crate::solver::{Progress, Solver, check, unit_lights};
 use crate::stats::Stats;
 use crate::transport::Exitant;
 use crate::{Light, LightKind, Rgb, SceneInput};
+use std::f32::consts::PI;
 use std::ops::ControlFlow;
 
 /// Lights that are switched together.
@@ -109,6 +111,7 @@ impl<L: LightField> Solver<L> {
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<(), SolveError> {
         self.can_take(input, field.as_ref(), false)?;
+        let emitted = self.emitted();
         let lights = unit_lights(input, &self.scene.normalization)?;
         let before = (
             std::mem::replace(&mut self.scene.materials, input.materials.clone()),
@@ -125,8 +128,10 @@ impl<L: LightField> Solver<L> {
             self.field = field;
             self.sort_materials();
             // All that was reflected was reflected by the old one.
-            self.last_reflected.fill(Rgb::splat(f32::NEG_INFINITY));
+            self.sent.iter_mut().for_each(Sent::forget);
         }
+        let times = ratio(self.emitted(), emitted);
+        self.exitant.irradiance.iter_mut().for_each(|irradiance| *irradiance *= times);
         self.settle_anew(watch);
         Ok(())
     }
@@ -168,11 +173,13 @@ impl<L: LightField> Solver<L> {
             exitance: self.scene.materials.iter().map(|material| material.exitance).collect(),
             intensity: self.scene.lights.iter().map(|light| light.intensity).collect(),
         };
+        let emitted = self.emitted();
         let mut colors = vec![Rgb::ZERO; lamps.len()];
         for lamp in 0..lamps.len() {
             colors[lamp] = Rgb::ONE;
             self.switch(&variants, &colors);
-            self.exitant.irradiance.fill(Rgb::ZERO);
+            let share = ratio(self.emitted(), emitted);
+            self.exitant.irradiance = before.iter().map(|irradiance| *irradiance * share).collect();
             self.settle_anew(watch);
             variants.irradiance.push(self.exitant.irradiance.clone());
             colors[lamp] = Rgb::ZERO;
@@ -225,6 +232,15 @@ impl<L: LightField> Solver<L> {
             self.pull();
         }
         Ok(())
+    }
+
+    /// What all that shines emits (powers, of which only ratios count): as that changes, so does light, roughly.
+    fn emitted(&self) -> Rgb {
+        let fronts = self.elements.patch_leaves().map(|leaf| &self.elements.nodes[leaf as usize]);
+        let fronts = fronts.filter(|element| element.kind == Kind::Front);
+        let surfaces = fronts.map(|front| self.scene.materials[front.material as usize].exitance * front.area);
+        let lights = self.scene.lights.iter().map(|light| light.intensity * (4.0 * PI));
+        surfaces.chain(lights).sum()
     }
 
     /// Lets each lamp shine in a colour, and nothing else.
@@ -295,6 +311,12 @@ impl<L: LightField> Solver<L> {
         }
         Ok(())
     }
+}
+
+/// `a` over `b` by channel, 1 where that is nothing.
+pub(crate) fn ratio(a: Rgb, b: Rgb) -> Rgb {
+    let ratio = a / b;
+    Rgb::select(ratio.is_finite_mask(), ratio, Rgb::ONE)
 }
 
 /// Whether two lights differ in intensity only.

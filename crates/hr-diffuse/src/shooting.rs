@@ -14,6 +14,8 @@ use crate::clock::Instant;
 use crate::hierarchy::Kind;
 use crate::hooks::LightField;
 use crate::links::Links;
+use crate::reflect::Reflect;
+use crate::sent::Sent;
 use crate::solver::{Solver, Transport};
 use crate::transport::Light;
 use crate::{Facing, Rgb};
@@ -134,6 +136,7 @@ impl<L: LightField> Solver<L> {
             shot.before = std::mem::replace(&mut self.exitant.irradiance, vec![Rgb::ZERO; nodes]);
             let none = std::iter::repeat_with(L::Exitant::default).take(nodes).collect();
             reflected = Some(std::mem::replace(&mut self.reflected, none));
+            self.gather.forget_directional();
             self.pull();
         }
         self.shot = Some(shot);
@@ -152,6 +155,7 @@ impl<L: LightField> Solver<L> {
         let Some(shot) = self.shot.take().filter(|_| self.elements.nodes[0].active) else { return };
         if let Some(reflected) = reflected {
             (self.exitant.irradiance, self.reflected) = (shot.before, reflected);
+            self.gather.forget_directional();
             return self.pull();
         }
         if !settled {
@@ -167,8 +171,8 @@ impl<L: LightField> Solver<L> {
         self.incident = incident;
         let middle = Instant::now();
         if reflects {
-            self.last_reflected.fill(Rgb::splat(f32::NEG_INFINITY));
-            self.reflect_senders(watch);
+            self.sent.iter_mut().for_each(Sent::forget);
+            self.reflect_senders(Reflect::Reshaped, watch);
         }
         self.pull();
         self.stats.seconds.transport += (middle - start).as_secs_f64();

@@ -13,6 +13,8 @@ pub(crate) struct Skips {
     pub(crate) proofs: bool,
     pub(crate) sealed_sides: bool,
     pub(crate) converged_leaves: bool,
+    /// Links over which a sender sends the same directional light as before.
+    pub(crate) steady_senders: bool,
     /// A look from each leaf at links that bring next to nothing.
     pub(crate) faint_links: bool,
     /// Values at vertices within places of many leaves.
@@ -31,6 +33,7 @@ impl Skips {
         proofs: true,
         sealed_sides: true,
         converged_leaves: true,
+        steady_senders: true,
         faint_links: true,
         inner_vertices: true,
         face_clusters: true,

@@ -14,10 +14,11 @@ use crate::hooks::LightField;
 use crate::kept_weights::KeptWeights;
 use crate::links::Links;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
-use crate::reflect::Senders;
-use crate::relight::Linked;
+use crate::reflect::{Reflect, Senders};
+use crate::relight::{Linked, ratio};
 use crate::residual::{RAYS_PER_LEAF, Residual, residual};
 use crate::resume::{Unfinished, is_worth};
+use crate::sent::Sent;
 use crate::shadows;
 use crate::shooting::Shot;
 use crate::skips::Skips;
@@ -43,6 +44,8 @@ const SMALLEST_SHARE: f32 = 0.008;
 const FAINT_SHARE: f32 = 0.7;
 /// Iterations end when all that are to come would change the solution by less than this share of the error.
 const CONVERGED_SHARE: f32 = 0.02;
+/// The same while an extension's light is sent in proportion to what arrives.
+const EXPECTED_SHARE: f32 = 0.3;
 /// No more iterations than these follow one refinement; a reflectance of 0.99 needs hundreds.
 const MOST_ITERATIONS: u32 = 400;
 /// So many where light need only be there roughly.
@@ -171,20 +174,14 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) faint: Vec<Rgb>,
     /// By material: what is reflected beside the diffuse part as directional light.
     strong: Vec<Rgb>,
-    /// Irradiance of each leaf when its light was last reflected by the extension.
-    pub(crate) last_reflected: Vec<Rgb>,
-    /// By leaf, [`strength`](crate::reflect::Representative::strength).
-    pub(crate) strengths: Vec<f32>,
-    /// What was negligible of it then ([`Arrived::negligible`](crate::hooks::Arrived)).
-    pub(crate) last_negligible: Vec<f32>,
+    /// By leaf, what it sends of the extension's light.
+    pub(crate) sent: Vec<Sent>,
     /// Directional light of leaves as it is to be shown: in its own detail, also where it stands for others.
     pub(crate) shown: Vec<(u32, L::Exitant)>,
     /// What has been shot, while light is.
     pub(crate) shot: Option<Shot>,
     /// What links may carry of the directional light of leaves: see [`columns`](crate::columns).
     pub(crate) feedback: Feedback,
-    /// Whether leaves are reflected anew where little has changed, too.
-    pub(crate) reflects_finely: bool,
     /// Largest radiance of each leaf's directional light (max channel).
     pub(crate) brightest: Vec<f32>,
     /// Area whose light counts.
@@ -265,13 +262,10 @@ impl<L: LightField> Solver<L> {
             linked: Linked::default(),
             faint,
             strong,
-            last_reflected: Vec::new(),
-            strengths: Vec::new(),
-            last_negligible: Vec::new(),
+            sent: Vec::new(),
             shown: Vec::new(),
             shot: None,
             feedback: Feedback::default(),
-            reflects_finely: false,
             brightest: Vec::new(),
             area,
             convergence: Convergence::default(),
@@ -326,7 +320,7 @@ impl<L: LightField> Solver<L> {
             let whole = &mut || ControlFlow::Continue(());
             self.prepare(None, whole);
             self.begin_shooting(false);
-            self.iterate(false, whole);
+            self.iterate(Reflect::Not, whole);
             self.finish_shooting(false, false, None, whole);
         }
         self.measure();
@@ -368,7 +362,7 @@ impl<L: LightField> Solver<L> {
             }
         }
         // Roughly it is what it was; but light may come from elsewhere, though it is as much.
-        self.last_reflected.fill(Rgb::splat(f32::NEG_INFINITY));
+        self.sent.iter_mut().for_each(Sent::forget);
         self.solve(&mut |progress| if stopped { ControlFlow::Break(()) } else { watch(progress) });
     }
 
@@ -381,10 +375,34 @@ impl<L: LightField> Solver<L> {
         if !prepared {
             self.prepare_watched(pass, stopped, watch);
         }
-        self.settle(pass, stopped, watch);
+        self.expect_in_proportion(pass, stopped, watch);
+        self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, Reflect::Reshaped), stopped, watch);
         if !prepared {
             self.calibrate(pass, stopped, watch);
         }
+    }
+
+    /// Lets light settle roughly, while the extension's light is sent in proportion to what arrives. By how much more that is than before on
+    /// the whole it is to be expected to be everywhere: only leaves that differ from that need be reflected anew.
+    fn expect_in_proportion(
+        &mut self,
+        pass: Pass,
+        stopped: &mut bool,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) {
+        if self.settings.transport != Transport::Gather || !self.elements.nodes[0].active {
+            return;
+        }
+        self.iterate_until(pass, (MOST_ITERATIONS, EXPECTED_SHARE, Reflect::InProportion), stopped, watch);
+        let (mut was, mut is) = (Rgb::ZERO, Rgb::ZERO);
+        for leaf in self.elements.patch_leaves().map(|leaf| leaf as usize) {
+            if let Some(irradiance) = self.sent.get(leaf).and_then(Sent::irradiance) {
+                was += irradiance * self.elements.nodes[leaf].area;
+                is += self.exitant.irradiance[leaf] * self.elements.nodes[leaf].area;
+            }
+        }
+        let times = ratio(is, was);
+        self.sent.iter_mut().for_each(|sent| sent.expect(times));
     }
 
     /// Iterates until light has settled, as far as a pass needs it.
@@ -392,10 +410,11 @@ impl<L: LightField> Solver<L> {
         // The extension's light is reflected when most of it is there: that is what takes time. Shooting starts from the dark anyhow.
         let warms = self.settings.transport == Transport::Gather && self.elements.nodes[0].active;
         if !pass.closely || warms {
-            self.iterate_until(pass, (FEW_ITERATIONS, 1.0, pass.reflects && !pass.closely), stopped, watch);
+            let how = if pass.reflects && !pass.closely { Reflect::Reshaped } else { Reflect::Not };
+            self.iterate_until(pass, (FEW_ITERATIONS, 1.0, how), stopped, watch);
         }
         if pass.closely && !*stopped {
-            self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, true), stopped, watch);
+            self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, Reflect::Reshaped), stopped, watch);
         }
     }
 
@@ -433,7 +452,7 @@ impl<L: LightField> Solver<L> {
     fn iterate_until(
         &mut self,
         pass: Pass,
-        (most, share, reflects): (u32, f32, bool),
+        (most, share, how): (u32, f32, Reflect),
         stopped: &mut bool,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) {
@@ -441,11 +460,12 @@ impl<L: LightField> Solver<L> {
             return;
         }
         let account = self.account;
+        let reflects = matches!(how, Reflect::Reshaped | Reflect::Changed);
         let mut before = self.begin_shooting(reflects);
         // Light settles with what leaves have reflected of much of it, and once more with what all reflect of all of it.
         let directional = reflects && self.elements.nodes[0].active;
         self.feedback.restart();
-        let (mut settled, mut finely) = (false, !directional || self.shot.is_some());
+        let (mut settled, mut finely, mut next) = (false, !directional || self.shot.is_some(), how);
         for iteration in 0..if before.is_some() { MOST_ITERATIONS } else { most } {
             let fraction = pass.fraction(0.6 + 0.3 * (iteration as f32 / (iteration as f32 + 4.0)));
             let progress = self.progress(Phase::Transport, fraction);
@@ -453,21 +473,20 @@ impl<L: LightField> Solver<L> {
                 *stopped = *stopped || watch(&progress).is_break();
                 if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
-            let Some(residual) = self.iterate(reflects, ask) else { break };
-            (before, self.reflects_finely) = (None, false);
+            let Some(residual) = self.iterate(next, ask) else { break };
+            (before, next) = (None, how);
             if directional && iteration % 2 == 1 {
                 let kept = self.kept();
                 self.feedback.rein_in(&self.exitant.irradiance, kept);
             }
             settled = self.remaining(residual) < share * self.settings.error && iteration > 0;
             if settled && !finely {
-                (settled, finely, self.reflects_finely) = (false, true, true);
+                (settled, finely, next) = (false, true, Reflect::Changed);
             }
             if *stopped || settled || account.is_over() {
                 break;
             }
         }
-        self.reflects_finely = false;
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         self.finish_shooting(reflects, settled, before, &mut || {
             *stopped = *stopped || watch(&progress).is_break();
@@ -495,7 +514,7 @@ impl<L: LightField> Solver<L> {
             return;
         }
         self.convergence.restart();
-        self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, true), stopped, watch);
+        self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, Reflect::Reshaped), stopped, watch);
     }
 
     /// Finds what the solution is off by.
@@ -545,7 +564,7 @@ impl<L: LightField> Solver<L> {
     fn measure(&mut self) {
         let links = self.links.all().len() as u64;
         self.stats.bytes =
-            self.account.measure(&self.field, &self.incident, &self.reflected, links, self.gather.weight_bytes());
+            self.account.measure(&self.field, &self.incident, &self.reflected, links, self.gather.kept_bytes());
     }
 
     /// Refines all links to a tolerance.
@@ -621,7 +640,7 @@ impl<L: LightField> Solver<L> {
 
     /// One iteration of the paper: gather, push, reflect, pull. Returns the change of the mean radiosity, relative
     /// to it; `None`, and no change, where `watch` broke before the light was gathered.
-    pub(crate) fn iterate(&mut self, reflects: bool, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Option<f32> {
+    pub(crate) fn iterate(&mut self, how: Reflect, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Option<f32> {
         let before: Vec<Rgb> = self.exitant.irradiance.clone();
         let start = Instant::now();
         if self.gather(watch).is_break() {
@@ -630,9 +649,7 @@ impl<L: LightField> Solver<L> {
         self.push();
         let residual = self.extrapolate(&before);
         let middle = Instant::now();
-        if reflects {
-            self.reflect_senders(watch);
-        }
+        self.reflect_senders(how, watch);
         let end = Instant::now();
         self.pull();
         self.stats.seconds.transport += (middle - start).as_secs_f64() + end.elapsed().as_secs_f64();
@@ -820,11 +837,6 @@ impl<L: LightField> Solver<L> {
         };
         let most = (0..self.scene.materials.len()).map(reflected).fold(0.0, f32::max);
         (most + REFLECTED_MARGIN).min(1.0).powi(2)
-    }
-
-    /// By link: the area that it lights, times what lets its light through.
-    pub(crate) fn lit(&self) -> &[f32] {
-        self.gather.lit()
     }
 
     /// What all iterations to come would change.

@@ -67,6 +67,8 @@ pub struct Skipped {
     pub sealed_sides: u64,
     /// Leaves whose incident light did not change enough to be reflected anew.
     pub converged_leaves: u64,
+    /// Links whose senders were not asked for their directional light in an iteration, as it is what it was.
+    pub steady_senders: u64,
     /// Links that bring so little that leaves do not look for themselves what they bring there.
     pub faint_links: u64,
     /// Vertices that gather nothing, as they lie within a place of many leaves that gathered for them.
@@ -86,6 +88,7 @@ impl std::ops::AddAssign for Skipped {
         self.proved_blocked += other.proved_blocked;
         self.sealed_sides += other.sealed_sides;
         self.converged_leaves += other.converged_leaves;
+        self.steady_senders += other.steady_senders;
         self.faint_links += other.faint_links;
         self.inner_vertices += other.inner_vertices;
         self.joined_leaves += other.joined_leaves;

@@ -106,7 +106,7 @@ impl<L: LightField> Light<'_, L> {
             all += kernel;
             seen += kernel * if part.is_flat() { facing } else { part.mean_cosine(-toward).max(LEAST_COSINE) };
             if facing > 0.0 {
-                sum += self.field.radiance(&self.reflected[leaf as usize], -toward) * (strength * facing * kernel * PI);
+                sum += self.field.radiance(&self.reflected[leaf as usize], -toward) * strength * (facing * kernel * PI);
             }
         }
         // Intensity per area over the mean cosine is mean radiance.
@@ -165,7 +165,7 @@ mod tests {
         let mut ranges = vec![[0; 2]; solver.elements.nodes.len()];
         ranges[nodes[0] as usize] = [0, 1];
         solver.exitant.senders =
-            Senders { ranges, standing: vec![Representative { leaf: nodes[0], share: 1.0, strength: 1.0 }] };
+            Senders { ranges, standing: vec![Representative { leaf: nodes[0], share: 1.0, strength: Rgb::ONE }] };
         solver.exitant.reflected_as = (0..solver.elements.nodes.len() as u32).collect();
         solver.exitant.peak.fill(FRAC_1_PI);
         (solver, nodes)

@@ -104,12 +104,16 @@ impl<L: LightField> Light<'_, L> {
 
     /// Mean of [`emitted`](Self::emitted) toward the receiver of a link.
     pub(crate) fn emitted_toward(&self, link: &Link) -> Rgb {
-        let (sender, receiver) = (link.sender, link.receiver);
-        let away = -self.direction_to(self.element(receiver).center, sender);
-        if self.element(sender).kind == Kind::Light {
-            return self.emitted(sender, away);
+        self.emitted_with(link, self.directional_toward(link.sender, link.receiver))
+    }
+
+    /// The same where its [`directional_toward`](Self::directional_toward) is known.
+    pub(crate) fn emitted_with(&self, link: &Link, directional: Rgb) -> Rgb {
+        let away = -self.direction_to(self.element(link.receiver).center, link.sender);
+        if self.element(link.sender).kind == Kind::Light {
+            return self.emitted(link.sender, away);
         }
-        self.together(sender, away, self.directional_toward(sender, receiver))
+        self.together(link.sender, away, directional)
     }
 
     /// The diffuse part of [`emitted`](Self::emitted), emission included.
@@ -163,7 +167,7 @@ impl<L: LightField> Light<'_, L> {
             // Radiance of a plane becomes intensity per area.
             let cosine = if part.is_flat() && !holder.is_flat() { part.normals.axis.dot(away).max(0.0) } else { 1.0 };
             if cosine > 0.0 {
-                light += self.field.radiance(&self.reflected[leaf as usize], away) * (cosine * share * strength * PI);
+                light += self.field.radiance(&self.reflected[leaf as usize], away) * strength * (cosine * share * PI);
             }
         }
         // Intensity per area over the mean cosine is mean radiance; near the terminator both fade.
@@ -196,7 +200,7 @@ impl<L: LightField> Light<'_, L> {
                 let part = self.element(leaf);
                 let (dim, bright) =
                     if part.is_flat() && !holder.is_flat() { part.normals.cosines_with(away) } else { (1.0, 1.0) };
-                let scale = share * strength * scale;
+                let scale = strength * (share * scale);
                 let (dim, bright) = (dim.max(0.0) * scale, bright.max(0.0) * scale);
                 low += least.max(Rgb::ZERO) * dim + least.min(Rgb::ZERO) * bright;
                 high += most.max(Rgb::ZERO) * bright;
@@ -474,7 +478,7 @@ mod tests {
         // One iteration from the dark.
         solver.exitant.irradiance.fill(Rgb::ZERO);
         solver.pull();
-        solver.iterate(false, go_on).expect("nobody breaks");
+        solver.iterate(crate::reflect::Reflect::Not, go_on).expect("nobody breaks");
         let power = |of: &[Rgb], lamp: bool| -> f32 {
             let leaves = solver.elements.patch_leaves().map(|leaf| (&solver.elements.nodes[leaf as usize], leaf));
             leaves

@@ -68,6 +68,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "proved_blocked": skipped.proved_blocked,
             "sealed_sides": skipped.sealed_sides,
             "converged_leaves": skipped.converged_leaves,
+            "steady_senders": skipped.steady_senders,
             "faint_links": skipped.faint_links,
             "inner_vertices": skipped.inner_vertices,
             "joined_leaves": skipped.joined_leaves,

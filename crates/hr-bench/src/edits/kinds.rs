@@ -24,8 +24,25 @@ pub(super) struct Edit {
     pub(super) input: SceneInput,
     /// Those of all materials, where they are others now.
     pub(super) reflectors: Option<Vec<Arc<dyn Reflector>>>,
-    /// Whether it is one of places: others need no new links.
-    pub(super) moves: bool,
+    pub(super) how: How,
+}
+
+/// What an edit needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum How {
+    /// Light has to settle anew.
+    Relight,
+    /// Links have to be renewed.
+    Rearrange,
+    /// The light of each lamp alone has to be found, and that of all of them again.
+    EachLamp,
+    /// It is known, and has to be added up.
+    Mix,
+}
+
+/// In which colours lamps shine after the edit of intensity, and in a mixture of them.
+pub(super) fn dimmed(lamp: usize) -> Rgb {
+    if lamp.is_multiple_of(2) { Rgb::splat(DIMMED) } else { Rgb::ONE }
 }
 
 /// All edits that a scene gives reason for.
@@ -37,22 +54,26 @@ pub(super) fn edits(scene: &Arc<Scene>) -> Vec<Edit> {
     edits
 }
 
-/// Every other lamp dimmed, all lamps coloured, all diffuse surfaces painted.
-fn light_and_paint(input: &SceneInput) -> [Edit; 3] {
-    let edit = |name, change: &dyn Fn(&mut SceneInput)| {
+/// Every other lamp dimmed, in two ways, each lamp by itself, all lamps coloured, all diffuse surfaces painted.
+fn light_and_paint(input: &SceneInput) -> [Edit; 5] {
+    let edit = |name, how, change: &dyn Fn(&mut SceneInput)| {
         let mut input = input.clone();
         change(&mut input);
-        Edit { name, input, reflectors: None, moves: false }
+        Edit { name, input, reflectors: None, how }
     };
-    let lamps = |input: &mut SceneInput, colors: [Rgb; 2]| {
+    let lamps = |input: &mut SceneInput, color: &dyn Fn(usize) -> Rgb| {
         let exitances = input.materials.iter_mut().map(|material| &mut material.exitance).filter(|e| **e != Rgb::ZERO);
         let intensities = input.lights.iter_mut().map(|light| &mut light.intensity);
-        exitances.chain(intensities).enumerate().for_each(|(i, of)| *of *= colors[i % 2]);
+        exitances.chain(intensities).enumerate().for_each(|(i, of)| *of *= color(i));
     };
     [
-        edit("intensity", &|input| lamps(input, [Rgb::splat(DIMMED), Rgb::ONE])),
-        edit("colour", &|input| lamps(input, [LIGHT_COLOR; 2])),
-        edit("reflectance", &|input| input.materials.iter_mut().for_each(|material| material.reflectance *= PAINT)),
+        edit("intensity", How::Relight, &|input| lamps(input, &dimmed)),
+        edit("each lamp alone", How::EachLamp, &|_| ()),
+        edit("mixture of lamps", How::Mix, &|input| lamps(input, &dimmed)),
+        edit("colour", How::Relight, &|input| lamps(input, &|_| LIGHT_COLOR)),
+        edit("reflectance", How::Relight, &|input| {
+            input.materials.iter_mut().for_each(|material| material.reflectance *= PAINT)
+        }),
     ]
 }
 
@@ -65,7 +86,7 @@ fn rougher(scene: &Arc<Scene>) -> Option<Edit> {
     glossy.sort_by_key(|&material| std::cmp::Reverse(count(material)));
     glossy.into_iter().find(|&material| roughened(&mut edited.materials[material], ROUGHER).is_ok())?;
     let reflectors = Some(edited.reflectors());
-    Some(Edit { name: "roughness", input: Arc::new(edited).input(), reflectors, moves: false })
+    Some(Edit { name: "roughness", input: Arc::new(edited).input(), reflectors, how: How::Relight })
 }
 
 /// The first set of surfaces that share corners which is neither large nor a lamp, and the first that is a lamp, elsewhere.
@@ -97,7 +118,7 @@ fn moves(input: &SceneInput) -> Vec<Edit> {
         } else {
             continue;
         }
-        edits.push(Edit { name, input: moved, reflectors: None, moves: true });
+        edits.push(Edit { name, input: moved, reflectors: None, how: How::Rearrange });
     }
     edits
 }

@@ -2,6 +2,7 @@ use super::Skips;
 use crate::hooks::{Arrived, Hierarchy, LightField, NodeId, Transfer};
 use crate::links::{Link, Links};
 use crate::refine::Pair;
+use crate::reflect::Reflect;
 use crate::sampling::{hash, unit};
 use crate::{Cone, DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solver, Surface};
 use glam::{DVec3, Vec3};
@@ -96,7 +97,7 @@ fn senders_that_stay_dark_change_nothing() {
     without.links = Links::new(links, without.elements.nodes.len());
     for solver in [&mut with, &mut without] {
         solver.prepare(Some(solver.settings.error), &mut || ControlFlow::Continue(()));
-        assert!(solver.iterate(true, &mut || ControlFlow::Continue(())).is_some(), "nobody stops it");
+        assert!(solver.iterate(Reflect::Reshaped, &mut || ControlFlow::Continue(())).is_some(), "nobody stops it");
     }
     assert_same(&with, &without, 0.0);
 }
@@ -173,7 +174,7 @@ fn iterations_that_are_left_out_would_change_nothing() {
     let mut solver = solve(&room(), ERROR, (), Skips::ALL);
     let before = radiosities(&solver);
     for _ in 0..50 {
-        let _ = solver.iterate(true, &mut || ControlFlow::Continue(()));
+        let _ = solver.iterate(Reflect::Reshaped, &mut || ControlFlow::Continue(()));
     }
     let change = difference(&before, &radiosities(&solver), solver.exitant.radiosity[0]);
     assert!(change < 0.1 * ERROR, "{change} of the mean radiosity");
@@ -227,6 +228,18 @@ fn leaves_whose_light_has_settled_change_little() {
     assert!(apart < ERROR, "{apart} of the mean radiosity");
 }
 
+#[test]
+fn senders_that_send_the_same_change_nothing() {
+    let mut input = room();
+    input.materials[GREY as usize].reflectance = Rgb::splat(0.3);
+    let field = || Echo { material: GREY, albedo: 0.3, errs: false };
+    let with = solve(&input, 0.1, field(), Skips::ALL);
+    let without = solve(&input, 0.1, field(), Skips { steady_senders: false, ..Skips::ALL });
+    assert!(with.stats.skipped.steady_senders > 1000, "{:?}", with.stats.skipped);
+    assert_eq!(without.stats.skipped.steady_senders, 0, "none is skipped");
+    assert_same(&with, &without, 0.0);
+}
+
 /// The room with its floor in many pieces, which reflect like the other walls.
 fn cut_room() -> SceneInput {
     const PARTS: u32 = 48;
@@ -252,7 +265,7 @@ fn leaves_of_face_clusters_change_little() {
     let [some, none] = [&with, &without].map(|solver| solver.face_clusters().joined(&solver.elements));
     assert!(some > 1000 && none == 0, "{some} of {} leaves, then {none}", with.stats.leaves);
     let [with_them, all] = [&with, &without].map(|solver| {
-        let stand = |leaf: &u32| solver.last_reflected[*leaf as usize].x >= 0.0;
+        let stand = |leaf: &u32| solver.sent[*leaf as usize].is_known();
         solver.elements.patch_leaves().filter(stand).count()
     });
     assert!(3 * with_them < 2 * all, "{with_them} of {all} leaves are reflected");
@@ -272,9 +285,9 @@ fn negligible_detail_changes_little() {
     let exact = solve(&input, ERROR, field(false), Skips { negligible_detail: false, ..Skips::ALL });
     assert_same(&without, &exact, 0.0);
     // Of the leaves that stand for others, what is negligible beside their light.
-    let shares: Vec<f32> = (0..with.last_negligible.len())
+    let shares: Vec<f32> = (0..with.sent.len())
         .filter(|&leaf| with.brightest[leaf] > 0.0)
-        .map(|leaf| with.last_negligible[leaf] / with.brightest[leaf])
+        .map(|leaf| with.sent[leaf].negligible() / with.brightest[leaf])
         .collect();
     let much = shares.iter().filter(|&&share| share > 0.1).count();
     assert!(3 * much > shares.len(), "a tenth of their light is negligible in {much} of {} leaves", shares.len());
