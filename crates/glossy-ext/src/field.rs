@@ -77,6 +77,15 @@ pub struct Counters {
     interpolated: AtomicU64,
 }
 
+/// Counts on from where they are.
+impl Clone for Counters {
+    fn clone(&self) -> Self {
+        let counters = Self::default();
+        counters.take_over(self.counts());
+        counters
+    }
+}
+
 impl Counters {
     /// All of them, to be kept.
     pub(crate) fn counts(&self) -> [u64; 5] {
@@ -133,7 +142,7 @@ impl Counters {
 ///
 /// Reflectors are not trusted: what no surface can do is clamped and [counted](Counters::clamped), so that a wrong one
 /// shows in its own place and never spoils the solution.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct GlossyField<B: Basis = Haar> {
     /// `None`: the material is diffuse.
     materials: Vec<Option<Material>>,

@@ -1,6 +1,6 @@
 //! Edits against fresh solves: what they take, and how far their light is from that of a solve of the scene as it is then.
 //!
-//! The difference is that of the mean irradiances of surface sides, Σ area |E − E'| / Σ area E'. [What is edited](kinds).
+//! The difference is that of the mean irradiances of surface sides, Σ area |E − E'| / Σ area E'. Every other lamp is dimmed to half, by light that settles anew and as a mixture of lamps; all lamps get another colour, diffuse surfaces other paint, the glossy material that most surfaces have √2 times the roughness. What moves is the first set of surfaces that share corners which is neither large nor a lamp, and the first such set that is a lamp.
 
 mod kinds;
 

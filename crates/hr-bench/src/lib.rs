@@ -10,7 +10,7 @@
 //! | `growth` | time and memory of generated scenes over their size |
 //! | `threads` | what more threads bring, and that they change nothing |
 //! | `transport` | gathering against shooting |
-//! | `edits` | moved objects and lamps against fresh solves |
+//! | `edits` | other light and paint, moved objects and lamps against fresh solves |
 //! | `form-factors` | form factors against closed forms and brute force |
 //! | `bounds` | how tight the oracle's bounds are |
 //! | `visibility` | rays per second, and links that need none |

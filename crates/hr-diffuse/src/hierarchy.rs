@@ -112,7 +112,7 @@ impl Element {
 }
 
 /// The static part of a scene in unit space, shared by solver and display.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct SceneData {
     /// Material of each surface.
     pub surface_materials: Vec<u32>,
@@ -172,7 +172,7 @@ impl SceneData {
 }
 
 /// The element hierarchy of a scene.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Elements {
     /// The nodes.
     pub nodes: Vec<Element>,

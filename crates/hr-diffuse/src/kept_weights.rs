@@ -18,7 +18,7 @@ use std::vec::IntoIter;
 const RISEN: f32 = 1.5;
 
 /// What leaves found out over the links that there were.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct KeptWeights {
     gather: Gather,
     links: Links,

@@ -17,7 +17,7 @@ enum Share {
 }
 
 /// What is elsewhere than it was.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Moved {
     /// By surface.
     surfaces: Vec<bool>,

@@ -144,7 +144,9 @@ pub struct Progress {
 }
 
 /// Solves for the light in a scene. `L` is what light does besides being diffuse radiosity; `()` for nothing.
-#[derive(Debug)]
+///
+/// To [`finish`](Self::finish) is the end of it. A clone can be finished instead, where edits of light and paint may come.
+#[derive(Clone, Debug)]
 pub struct Solver<L: LightField = ()> {
     pub(crate) scene: SceneData,
     pub(crate) elements: Elements,

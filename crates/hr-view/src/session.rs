@@ -2,8 +2,8 @@
 //!
 //! One thread solves, in a rayon pool of its own, so that the window never waits for it. It first shows what the scene
 //! looks like with hardly any light transport, then a sketch of a solution, then the one asked for; what the user wants
-//! meanwhile it learns between two steps of the solver. Every solution is solved for anew: the old one stays in the
-//! window until then.
+//! meanwhile it learns between two steps of the solver. Edits of materials are followed over the links of what was solved last, and
+//! every solution is then solved for anew: the old one stays in the window until then.
 
 use crate::args::Args;
 use crate::camera_path::CameraPath;
@@ -13,12 +13,12 @@ use crate::interrupt::{Interrupt, STOPPING};
 use crate::loading::load;
 use crate::progress::{Progress, activity};
 use crate::solution_file;
-use crate::solved::{Accuracy, Solved, Wanted};
+use crate::solved::{Accuracy, Editable, Solved, Wanted};
 use crate::stats::{self, Times};
 use crate::walkthrough::Walkthrough;
 use crate::watched::Watched;
 use crate::window::{self, Screen, Status, WindowOptions, Wish};
-use hr_diffuse::{Budget, Phase, Settings};
+use hr_diffuse::{Budget, Phase, Settings, SolveError};
 use hr_scene::edits::{brightened, roughened};
 use hr_scene::{Material, Rgb, Scene};
 use std::collections::VecDeque;
@@ -95,6 +95,8 @@ enum Task {
     /// Solve to an error and show it soon: without directional light that no link asks for, and with values at vertices
     /// as exact as there is patience for. Both may take longer than all the rest.
     Sketch(f32),
+    /// Let the light of what was solved last follow an edit.
+    Follow,
     /// Solve to an error; shown if it is better than what is shown, or in any case.
     Solve { error: f32, in_any_case: bool },
 }
@@ -113,6 +115,8 @@ struct Session {
     scene: Option<Arc<Scene>>,
     /// What the solution to come goes on from.
     begun: Option<(Solved, Accuracy)>,
+    /// What takes over edits.
+    editable: Option<Editable>,
     /// Whether it is no longer what the file says; then it is not kept.
     is_edited: bool,
     /// Whether there is something in the window.
@@ -143,6 +147,7 @@ impl Session {
             told: now,
             scene: None,
             begun: None,
+            editable: None,
             is_edited: false,
             has_shown: false,
             loaded: 0.0,
@@ -219,6 +224,7 @@ impl Session {
                 Some(Duration::ZERO) => Ok(()),
                 left => self.solve(error, left, false, true),
             },
+            Task::Follow => self.follow(),
             Task::Solve { error, in_any_case } => match if in_any_case { None } else { self.time_left() } {
                 Some(Duration::ZERO) => Ok(()),
                 left => self.solve(error, left, in_any_case, false),
@@ -237,7 +243,7 @@ impl Session {
         let scene = load(&self.args, &self.progress)?;
         self.loaded = begin.elapsed().as_secs_f64();
         self.scene = Some(Arc::clone(&scene));
-        self.is_edited = false;
+        (self.is_edited, self.editable) = (false, None);
         if let Some(path) = &self.args.load {
             let (solved, accuracy) = solution_file::load(path, scene)?;
             self.status.asked = accuracy.asked;
@@ -273,7 +279,7 @@ impl Session {
         // Mirrors are shown by their distributions in any mode; what is kept is for every mode.
         let mirrors = || scene.materials.iter().any(|material| material.reflector.mirror() != Rgb::ZERO);
         let wants_distributions = self.mode() == Mode::Distributions || self.args.save.is_some() || mirrors();
-        let begun = self.begun.take();
+        let (begun, mut editable) = (self.begun.take(), None);
         self.interrupt = Some(Interrupt::listen());
         let ask = &mut |state: &hr_diffuse::Progress| match self.attend(state) {
             Wanted::Whole if is_sketch && state.phase == Phase::Reconstruct => Wanted::Now,
@@ -282,9 +288,14 @@ impl Session {
         let distributions = wants_distributions && !is_sketch;
         let found = match begun {
             Some((solved, accuracy)) => solved.resumed(settings, distributions, accuracy, ask),
-            None => Solved::awaited(scene, settings, distributions, ask),
+            None if is_sketch => Solved::awaited(scene, settings, distributions, ask),
+            None => Solved::editable(scene, settings, distributions, ask).map(|(solved, accuracy, kept)| {
+                editable = kept;
+                (solved, accuracy)
+            }),
         };
         self.interrupt = None;
+        self.editable = editable.or_else(|| self.editable.take());
         let (solved, mut accuracy) = found?;
         accuracy.asked = self.status.asked;
         if is_glance {
@@ -297,6 +308,26 @@ impl Session {
             return Ok(());
         }
         self.show(solved, accuracy)
+    }
+
+    /// Shows what was solved last in the light of an edit.
+    fn follow(&mut self) -> Result<(), ViewError> {
+        let (Some(scene), Some(mut editable)) = (self.scene.clone(), self.editable.take()) else { return Ok(()) };
+        self.begin("light follows");
+        let settings = Settings { transport: self.args.transport, ..Settings::with_error(self.status.asked) };
+        self.interrupt = Some(Interrupt::listen());
+        let found = editable.relit(scene, settings, &mut |state| match self.attend(state) {
+            Wanted::Whole if state.phase == Phase::Reconstruct => Wanted::Now,
+            wanted => wanted,
+        });
+        self.interrupt = None;
+        let (solved, accuracy) = match found {
+            // What needs other links gets them when it is solved anew.
+            Err(SolveError::Edit { .. }) => return Ok(()),
+            found => found?,
+        };
+        self.editable = Some(editable);
+        if self.wanted == Wanted::Nothing { Ok(()) } else { self.show(solved, accuracy) }
     }
 
     fn mode(&self) -> Mode {
@@ -410,7 +441,7 @@ impl Session {
         self.wanted = Wanted::Nothing;
     }
 
-    /// Changes a material and solves again, coarsely first; what is shown stays until then.
+    /// Changes a material. The light of what was solved last follows at once, where there is any; then all is solved again.
     fn edit(&mut self, material: u32, change: impl FnOnce(&mut Material) -> Result<String, String>) {
         let Some(scene) = &self.scene else { return self.screen.say("still loading") };
         let mut scene = Scene::clone(scene);
@@ -423,7 +454,12 @@ impl Session {
         self.is_edited = true;
         // Any solution of the new scene is better than one of the old.
         self.status.shown = None;
-        self.again([(COARSER * self.status.asked).min(COARSEST), self.status.asked]);
+        if self.editable.is_some() {
+            self.again([self.status.asked]);
+            self.tasks.push_front(Task::Follow);
+        } else {
+            self.again([(COARSER * self.status.asked).min(COARSEST), self.status.asked]);
+        }
     }
 
     /// Looks at the scene's file now and then; reads it again where it has changed.

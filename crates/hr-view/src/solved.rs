@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 
 /// Values at vertices after a solve that was stopped may take this much longer than the solve took, and a second.
 const PATIENCE: f64 = 0.5;
+/// Bytes of a solver that is kept for edits: it takes as much as the solution once more.
+const MOST_KEPT: u64 = 1 << 29;
 
 /// What is wanted of a solution that is being made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,8 +56,7 @@ impl Solved {
         distributions: bool,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, SolveError> {
-        let field = GlossyField::new(&scene.reflectors(), Refinement::default());
-        let solver = Solver::new(&scene.input(), settings, field)?;
+        let solver = solver(&scene, settings)?;
         Ok(Self::by(scene, solver, distributions, watch))
     }
 
@@ -80,6 +81,16 @@ impl Solved {
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Self {
         solver.solve(watch);
+        Self::shown(scene, solver, distributions, watch)
+    }
+
+    /// Makes what has been solved ready to be looked at.
+    fn shown(
+        scene: Arc<Scene>,
+        mut solver: Solver<GlossyField>,
+        distributions: bool,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Self {
         if distributions {
             solver.reflect_for_display(watch);
         }
@@ -99,6 +110,29 @@ impl Solved {
         ask: &mut dyn FnMut(&Progress) -> Wanted,
     ) -> Result<(Self, Accuracy), SolveError> {
         Self::waiting(settings, 1.0, ask, |watch| Self::new(scene, settings, distributions, watch))
+    }
+
+    /// The same, and what takes over edits; nothing where it was stopped, or is too large to be kept twice.
+    ///
+    /// # Errors
+    /// Where the scene makes no sense to the solver.
+    pub(crate) fn editable(
+        scene: Arc<Scene>,
+        settings: Settings,
+        distributions: bool,
+        ask: &mut dyn FnMut(&Progress) -> Wanted,
+    ) -> Result<(Self, Accuracy, Option<Editable>), SolveError> {
+        let mut editable = None;
+        let (solved, accuracy) = Self::waiting(settings, 1.0, ask, |watch| {
+            let mut solver = solver(&scene, settings)?;
+            solver.solve(watch);
+            let stats = solver.stats();
+            if !stats.stopped && stats.spent.is_none() && stats.bytes <= MOST_KEPT {
+                editable = Some(Editable { scene: Arc::clone(&scene), solver: solver.clone() });
+            }
+            Ok(Self::shown(scene, solver, distributions, watch))
+        })?;
+        Ok((solved, accuracy, editable))
     }
 
     /// [`resume`](Self::resume), for as long as it is wanted, as [`awaited`](Self::awaited) does; `accuracy` is that of what was
@@ -151,11 +185,70 @@ impl Solved {
     }
 }
 
+fn solver(scene: &Arc<Scene>, settings: Settings) -> Result<Solver<GlossyField>, SolveError> {
+    let field = GlossyField::new(&scene.reflectors(), Refinement::default());
+    Solver::new(&scene.input(), settings, field)
+}
+
+/// A solver that has solved, and the scene as it was then.
+#[derive(Debug)]
+pub(crate) struct Editable {
+    scene: Arc<Scene>,
+    solver: Solver<GlossyField>,
+}
+
+impl Editable {
+    /// Takes over other light and paint, for as long as it is wanted: see [`Solver::relight`]. Shown as soon as may be, without directional light
+    /// that no link asks for.
+    ///
+    /// # Errors
+    /// [`SolveError::Edit`] for what needs new links.
+    pub(crate) fn relit(
+        &mut self,
+        scene: Arc<Scene>,
+        settings: Settings,
+        ask: &mut dyn FnMut(&Progress) -> Wanted,
+    ) -> Result<(Solved, Accuracy), SolveError> {
+        let before = self.scene.materials.iter().map(|material| &material.reflector);
+        let same = scene.materials.iter().zip(before).all(|(now, before)| Arc::ptr_eq(&now.reflector, before));
+        let field = (!same).then(|| GlossyField::new(&scene.reflectors(), Refinement::default()));
+        Solved::waiting(settings, 1.0, ask, |watch| {
+            self.solver.relight(&scene.input(), field, watch)?;
+            self.scene = Arc::clone(&scene);
+            Ok(Solved::shown(scene, self.solver.clone(), false, watch))
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use glam::Vec3;
     use glossy_ext::Lambert;
+    use hr_scene::Material;
+    use hr_scene::edits::roughened;
+
+    #[test]
+    fn edits_follow_what_was_solved() {
+        let ask = &mut |_: &_| Wanted::Whole;
+        let settings = Settings::with_error(0.1);
+        let scene = Arc::new(Scene::load("glossy-sphere").expect("built in"));
+        let (solved, _, editable) = Solved::editable(Arc::clone(&scene), settings, false, ask).expect("a sound scene");
+        let mut editable = editable.expect("it is small");
+        let mut edited = Scene::clone(&scene);
+        let glossy = |material: &&mut Material| !material.reflector.is_diffuse();
+        roughened(edited.materials.iter_mut().find(glossy).expect("one is glossy"), 2.0).expect("it can be");
+        edited.materials.iter_mut().for_each(|material| material.exitance *= 0.5);
+        edited.lights.iter_mut().for_each(|light| light.intensity *= 0.5);
+        let edited = Arc::new(edited);
+        let (relit, accuracy) = editable.relit(Arc::clone(&edited), settings, ask).expect("links serve for it");
+        let fresh = Solved::new(edited, settings, false, &mut |_| ControlFlow::Continue(())).expect("a sound scene");
+        let mean = |solved: &Solved| solved.solution.exitant.irradiance[0].element_sum();
+        let (off, edit) = (mean(&relit) / mean(&fresh), mean(&fresh) / mean(&solved));
+        assert!((off - 1.0).abs() < 0.05 && edit < 0.6, "off by a factor of {off}, by an edit of {edit}");
+        assert!(accuracy.believed < 0.1, "{accuracy:?}");
+        assert_eq!(relit.solution.stats.rays, solved.solution.stats.rays, "nothing is looked at again");
+    }
 
     /// The light between elements comes from what stands for many normals, however detailed curved leaves are shown.
     #[test]

@@ -72,7 +72,7 @@ fn light_and_paint(input: &SceneInput) -> [Edit; 5] {
         edit("mixture of lamps", How::Mix, &|input| lamps(input, &dimmed)),
         edit("colour", How::Relight, &|input| lamps(input, &|_| LIGHT_COLOR)),
         edit("reflectance", How::Relight, &|input| {
-            input.materials.iter_mut().for_each(|material| material.reflectance *= PAINT)
+            input.materials.iter_mut().for_each(|material| material.reflectance *= PAINT);
         }),
     ]
 }
