@@ -202,6 +202,10 @@ pub struct ThreadsArgs {
     pub error: f32,
 }
 
+/// The last words of the names of edits.
+pub(crate) const EDITS: [&str; 8] =
+    ["intensity", "alone", "lamps", "colour", "reflectance", "roughness", "object", "lamp"];
+
 /// Of `hr-bench edits`.
 #[derive(Clone, Debug, PartialEq, Args)]
 pub struct EditsArgs {
@@ -213,8 +217,8 @@ pub struct EditsArgs {
     #[arg(long, value_name = "E", default_value_t = 0.05)]
     pub error: f32,
 
-    /// Only these edits: intensity, colour, reflectance, roughness, object, lamp
-    #[arg(long, value_name = "EDIT,EDIT,...", value_delimiter = ',')]
+    /// Only these edits, by the last word of their names
+    #[arg(long, value_name = "EDIT,EDIT,...", value_delimiter = ',', value_parser = EDITS)]
     pub only: Vec<String>,
 }
 

@@ -1,6 +1,9 @@
 //! Edits against fresh solves: what they take, and how far their light is from that of a solve of the scene as it is then.
 //!
-//! The difference is that of the mean irradiances of surface sides, Σ area |E − E'| / Σ area E'. Every other lamp is dimmed to half, by light that settles anew and as a mixture of lamps; all lamps get another colour, diffuse surfaces other paint, the glossy material that most surfaces have √2 times the roughness. What moves is the first set of surfaces that share corners which is neither large nor a lamp, and the first such set that is a lamp.
+//! The difference is that of the mean irradiances of surface sides, Σ area |E − E'| / Σ area E'. Every other lamp is dimmed to half, by light
+//! that settles anew and as a mixture of lamps; all lamps get another colour, diffuse surfaces other paint, the glossy material that most
+//! surfaces have √2 times the roughness. What moves is the first set of surfaces that share corners which is neither large nor a lamp,
+//! and the first such set that is a lamp.
 
 mod kinds;
 
@@ -110,6 +113,7 @@ fn sides(solver: &Solver<GlossyField>) -> Vec<(f64, Rgb)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::args::EDITS;
 
     #[test]
     fn edits_are_measured_and_right() {
@@ -121,6 +125,7 @@ mod tests {
         assert_eq!(rows.len(), 7, "light, paint, an object and a lamp: {said}");
         for row in rows {
             assert_eq!(row.len(), 10, "as many columns everywhere: {said}");
+            assert!(EDITS.iter().any(|name| row[2].ends_with(name)), "it can be asked for alone: {said}");
             let difference: f64 = row[8].parse().expect("a number");
             assert!(difference < 1.0, "the same answer: {said}");
         }

@@ -69,7 +69,7 @@ pub struct Representative {
     pub leaf: u32,
     /// The share of the sender's area that it stands for.
     pub share: f32,
-    /// It sends so many times as much as was reflected when it was reflected last: as much more as arrives.
+    /// It sends so many times as much, by channel, as was reflected when it was reflected last: as much more as arrives.
     pub strength: Rgb,
 }
 
