@@ -1,14 +1,29 @@
 //! Edits of glossy scenes over links that exist.
 
-use crate::scenes::Room;
+use crate::scenes::{Room, quad, walls};
+use glam::DVec3;
 use glossy_ext::haar::Refinement;
-use glossy_ext::{GlossyField, Phong};
-use hr_diffuse::{Rgb, Settings, Solver};
+use glossy_ext::{GlossyField, Lambert, Phong, Reflector, Ward};
+use hr_diffuse::{DiffuseMaterial, Light, LightKind, Rgb, SceneInput, Settings, Solver, Surface};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// Coarse: mean radiosities of surfaces are much better.
 const ERROR: f32 = 0.1;
+
+/// Surfaces of a glossy material, 0, diffuse grey, 1, and a lamp of area, 2.
+fn room_of(surfaces: Vec<Surface>, specular: Ward, lights: Vec<Light>) -> Room {
+    let grey = |share| Arc::new(Lambert::new(Rgb::splat(share)).expect("a share")) as Arc<dyn Reflector>;
+    let reflectors = vec![Arc::new(specular) as Arc<dyn Reflector>, grey(0.5), grey(0.0)];
+    let exitance = [Rgb::ZERO, Rgb::ZERO, Rgb::splat(50.0)];
+    let material = |(reflector, exitance): (&Arc<dyn Reflector>, Rgb)| DiffuseMaterial {
+        reflectance: reflector.diffuse(),
+        exitance,
+        two_sided: false,
+    };
+    let materials = reflectors.iter().zip(exitance).map(material).collect();
+    Room { input: SceneInput { surfaces, materials, lights, texture: None }, reflectors }
+}
 
 fn solved(room: &Room) -> Solver<GlossyField> {
     let field = GlossyField::new(&room.reflectors, Refinement::default());
@@ -86,5 +101,50 @@ fn glossy_lamps_can_be_mixed() {
     room.input.materials.iter_mut().for_each(|material| material.exitance *= colors[0]);
     room.input.lights[0].intensity *= colors[1];
     let off = difference(&fronts(&solver), &fronts(&solved(&room)));
+    assert!(off < 0.5 * ERROR, "off by {off}");
+}
+
+/// A small metal plate that is lit from one side, then as strongly from the other: its leaves receive as much, but send it elsewhere.
+#[test]
+fn lobes_turn_with_a_lamp_that_moves() {
+    let lit_from = |x: f64| {
+        let position = DVec3::new(x, 6.0, 8.0);
+        let kind = LightKind::Spot { direction: -position.normalize().as_vec3(), cos_inner: 0.9995, cos_outer: 0.999 };
+        let lamp = Light { position, intensity: Rgb::splat(100.0), kind };
+        let plate = quad(DVec3::new(-0.1, -0.1, 0.0), DVec3::X * 0.2, DVec3::Y * 0.2, 0);
+        let screens = [-1.8, 0.0].map(|x| quad(DVec3::new(x, -1.0, 0.3), DVec3::Z * 1.9, DVec3::X * 1.8, 1));
+        let metal = Ward::new(Rgb::ZERO, Rgb::splat(0.9), 0.2).expect("a Ward lobe");
+        let last = quad(DVec3::new(-0.1, -0.1, -2.0), DVec3::X * 0.2, DVec3::Y * 0.2, 1);
+        room_of([&[plate], screens.as_slice(), &[last]].concat(), metal, vec![lamp])
+    };
+    let [right, left] = [6.0, -6.0].map(lit_from);
+    let mut solver = solved(&right);
+    let [before, fresh] = [fronts(&solver), fronts(&solved(&left))];
+    assert!(difference(&before[1..], &fresh[1..]) > 1.0, "the other screen is lit: {before:?} {fresh:?}");
+    solver.rearrange(&left.input, &mut |_| ControlFlow::Continue(())).expect("a lamp elsewhere");
+    let off = difference(&fronts(&solver)[1..], &fresh[1..]);
+    assert!(off < 0.5 * ERROR, "off by {off}: {:?} {fresh:?}", fronts(&solver));
+}
+
+/// What moves at one end of a glossy floor does not have the other end reflected anew.
+#[test]
+fn moved_things_reflect_few_leaves_anew() {
+    const BAR: u64 = 70;
+    let hall = |x: f64| {
+        let mut surfaces = walls(DVec3::ZERO, DVec3::new(16.0, 3.0, 2.5), 1);
+        surfaces[4].material = 0;
+        surfaces.extend(walls(DVec3::new(x + 0.4, 1.4, 0.8), DVec3::new(x, 1.0, 0.4), 1));
+        let lamp = |x: f64| quad(DVec3::new(x, 1.0, 2.4), DVec3::Y, DVec3::X, 2);
+        surfaces.extend([1.0, 5.0, 10.0, 14.0].map(lamp));
+        room_of(surfaces, Ward::new(Rgb::splat(0.3), Rgb::splat(0.3), 0.2).expect("a Ward lobe"), Vec::new())
+    };
+    let mut solver = solved(&hall(0.5));
+    let reflected = |solver: &Solver<GlossyField>| solver.field().counters().brdf_evaluations();
+    let first = reflected(&solver);
+    solver.rearrange(&hall(1.5).input, &mut |_| ControlFlow::Continue(())).expect("a box in another place");
+    let share = 100 * (reflected(&solver) - first) / first;
+    println!("{share} %");
+    assert!(share < BAR, "{share} % of what the solve reflected");
+    let off = difference(&fronts(&solver), &fronts(&solved(&hall(1.5))));
     assert!(off < 0.5 * ERROR, "off by {off}");
 }

@@ -2,6 +2,7 @@
 //! between leaf and sender. Leaves need not look for themselves again what these bring. Which links of theirs are
 //! still fine enough is told from the same light.
 
+use crate::Rgb;
 use crate::gather::Gather;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
@@ -16,6 +17,9 @@ use std::vec::IntoIter;
 
 /// Links of senders that are up to so many times as bright as they were are taken to be fine enough still: rays find out whether they are.
 const RISEN: f32 = 1.5;
+/// Where light of a sender that is distributed otherwise than it was brings a place no more than this share of its irradiance, times
+/// the tolerance, its weight stays all the same.
+pub(crate) const UNEVEN_SHARE: f32 = 0.05;
 
 /// What leaves found out over the links that there were.
 #[derive(Clone, Debug)]
@@ -27,8 +31,8 @@ pub(crate) struct KeptWeights {
     moved: Moved,
     /// By node: radiosity and directional light (sums of channels) when the weights were found.
     light: Vec<[f32; 2]>,
-    /// By node: whether its light is distributed as it was then.
-    even: Vec<bool>,
+    /// By node: the share of its light that is distributed otherwise than it was then.
+    uneven: Vec<f32>,
     /// Whether leaves need not look for themselves at other links either: not before most of the light is there.
     pub(crate) rough: bool,
 }
@@ -36,19 +40,24 @@ pub(crate) struct KeptWeights {
 impl KeptWeights {
     /// Those of links of which some stay.
     pub(crate) fn new(gather: Gather, links: Links, stays: Vec<bool>, moved: Moved, exitant: &Exitant) -> Self {
-        Self { gather, links, stays, moved, light: light(exitant), even: Vec::new(), rough: false }
+        Self { gather, links, stays, moved, light: light(exitant), uneven: Vec::new(), rough: false }
     }
 
-    /// Leaves out senders whose light is distributed among their parts otherwise than it was, by more than a share. Where directional
-    /// light goes is not known; as long as it is as much, it is taken to come from where it came from, and to go where it went.
-    pub(crate) fn with_light(mut self, elements: &Elements, exitant: &Exitant, share: f32) -> Self {
+    /// Finds which senders' light is distributed among their parts otherwise than it was. Where directional light goes is not known;
+    /// as long as it is as much, it is taken to come from where it came from, and to go where it went.
+    pub(crate) fn with_light(mut self, elements: &Elements, exitant: &Exitant) -> Self {
         let now = light(exitant);
-        let changed = redistributed(elements, &self.light, &now);
-        let as_much = |before: Option<&[f32; 2]>, now: [f32; 2]| {
-            now[1] == 0.0 || before.is_some_and(|before| (now[1] - before[1]).abs() <= share * now[1])
+        // Parts that are new had the light of what they are parts of.
+        for node in self.light.len()..now.len() {
+            self.light.push(self.light[elements.nodes[node].parent as usize]);
+        }
+        let redirected = |(before, now): (&[f32; 2], &[f32; 2])| {
+            let changed = (now[1] - before[1]).abs();
+            if changed > 0.0 { changed / (now[0] + now[1]) } else { 0.0 }
         };
-        let even = |(node, by): (usize, &f32)| *by <= share && as_much(self.light.get(node), now[node]);
-        self.even = changed.iter().enumerate().map(even).collect();
+        let redirected = self.light.iter().zip(&now).map(redirected);
+        self.uneven =
+            redistributed(elements, &self.light, &now).into_iter().zip(redirected).map(|(a, b)| a + b).collect();
         self
     }
 
@@ -68,28 +77,73 @@ impl KeptWeights {
         self.rough.then_some(Self { rough: false, ..self })
     }
 
-    /// Weights of a place that stay, with their links: in the order of the nodes from the place up to the root, then of senders.
-    pub(crate) fn of<L: LightField>(&self, light: Light<'_, L>, place: u32) -> Vec<(Link, Weight)> {
-        let stay = |(at, weight): (usize, Weight)| {
-            let link = self.links.all()[at];
-            let pair = Pair { receiver: place, sender: link.sender };
-            let stays = self.even[link.sender as usize]
-                && (self.stays[at] || !self.moved.concerns(light.scene, light.elements, pair));
-            stays.then_some((link, weight))
+    /// By node, the share of what arrives there that did not arrive before, or does not any more, from where it does: of what its links
+    /// and those above it bring. Nothing is taken to arrive as it did where the node or its sender, or parts of them, have moved.
+    pub(crate) fn reshaped(&mut self, elements: &Elements, (links, arriving): (&Links, &[Rgb])) -> Vec<f32> {
+        let brought = |links: &Links, arriving: &[Rgb], node: u32| -> Vec<(u32, f32)> {
+            let arriving = |at: usize| arriving.get(at).map_or(0.0, |arriving| arriving.element_sum().max(0.0));
+            links.range(node).map(|at| (links.all()[at].sender, arriving(at))).collect()
         };
-        self.gather.looked_at(light.elements, place).into_iter().filter_map(stay).collect()
+        self.moved.mark(elements);
+        // By node: all that arrives, what of it did not, and what did and does not any more.
+        let mut sums = vec![[0.0_f32; 3]; elements.nodes.len()];
+        for node in 0..sums.len() {
+            let [mut all, mut came, mut went] =
+                if node > 0 { sums[elements.nodes[node].parent as usize] } else { [0.0; 3] };
+            let mut before = brought(&self.links, self.gather.arriving(), node as u32).into_iter().peekable();
+            for (sender, now) in brought(links, arriving, node as u32) {
+                while let Some((_, gone)) = before.next_if(|(other, _)| *other < sender) {
+                    went += gone;
+                }
+                let was = before.next_if(|(other, _)| *other == sender).map_or(0.0, |(_, was)| was);
+                let stays = if self.moved.is_below(sender) { 0.0 } else { now.min(was) };
+                (all, came, went) = (all + now, came + now - stays, went + was - stays);
+            }
+            went += before.map(|(_, gone)| gone).sum::<f32>();
+            sums[node] = [all, came, went];
+        }
+        let share = |(node, [all, came, went]): (usize, [f32; 3])| {
+            let changed = if self.moved.is_below(node as u32) { f32::INFINITY } else { came.max(went) };
+            if changed > 0.0 { changed / all } else { 0.0 }
+        };
+        sums.into_iter().enumerate().map(share).collect()
+    }
+
+    /// Weights of a place, in the order of the nodes from the place up to the root, then of senders.
+    pub(crate) fn of(&self, elements: &Elements, place: u32) -> PlaceWeights<'_> {
+        PlaceWeights { kept: self, place, left: self.gather.looked_at(elements, place).into_iter().peekable() }
     }
 }
 
-/// The weight for a link among those of a place that are left; the links before it are passed over.
-pub(crate) fn take(known: &mut Peekable<IntoIter<(Link, Weight)>>, link: &Link) -> Option<Weight> {
-    let place = |link: &Link| (Reverse(link.receiver), link.sender);
-    while known.next_if(|(other, _)| place(other) < place(link)).is_some() {}
-    let (before, weight) = known.next_if(|(other, _)| place(other) == place(link))?;
-    // What the link brings to its receiver may be another mean now.
-    let brings = |link: &Link| link.factor * visible(link, Spread::Exact);
-    let weight = weight * (brings(&before) / brings(link));
-    weight.value.is_finite().then_some(weight)
+/// Weights that a place found, over links in order.
+pub(crate) struct PlaceWeights<'a> {
+    kept: &'a KeptWeights,
+    place: u32,
+    left: Peekable<IntoIter<(usize, Weight)>>,
+}
+
+impl PlaceWeights<'_> {
+    /// The one for a link, if it stays; those for links before it are passed over. `brings` is what the link brings to its
+    /// receiver; up to `negligible` of it may come from elsewhere than it did.
+    pub(crate) fn take<L: LightField>(
+        &mut self,
+        light: Light<'_, L>,
+        link: &Link,
+        (brings, negligible): (f32, f32),
+    ) -> Option<Weight> {
+        let KeptWeights { links, stays, moved, uneven, .. } = self.kept;
+        let order = |link: &Link| (Reverse(link.receiver), link.sender);
+        while self.left.next_if(|(at, _)| order(&links.all()[*at]) < order(link)).is_some() {}
+        let (at, weight) = self.left.next_if(|(at, _)| order(&links.all()[*at]) == order(link))?;
+        // What the link brings to its receiver may be another mean now.
+        let passes = |link: &Link| link.factor * visible(link, Spread::Exact);
+        let weight = weight * (passes(&links.all()[at]) / passes(link));
+        let pair = Pair { receiver: self.place, sender: link.sender };
+        let stays = weight.value.is_finite()
+            && weight.value * brings * uneven[link.sender as usize] <= negligible
+            && (stays[at] || !moved.concerns(light.scene, light.elements, pair));
+        stays.then_some(weight)
+    }
 }
 
 /// By node: radiosity and directional light (sums of channels).

@@ -11,7 +11,7 @@ use crate::gather::{GROUPS, Group};
 use crate::hierarchy::{Element, Elements, GRAFT, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
 use crate::inherited::{Above, Carried, inherit};
-use crate::kept_weights::{KeptWeights, take};
+use crate::kept_weights::{KeptWeights, UNEVEN_SHARE};
 use crate::links::{Link, Links};
 use crate::places::{Edges, Places};
 use crate::sampling::hash;
@@ -165,7 +165,7 @@ impl Push {
             }
             let shot = part.par_iter_mut().with_min_len(4).map(|(node, weights)| {
                 let (mut slots, mut rays) = (weights.chunks_exact_mut(numbers(light, *node)), 0);
-                let mut known = known.map_or_else(Vec::new, |it| it.of(light, *node)).into_iter().peekable();
+                let mut known = known.map(|known| known.of(light.elements, *node));
                 push.each(light, *node, |place, at| {
                     if let Some(slot) = slots.next() {
                         let link = &links.all()[at];
@@ -173,7 +173,9 @@ impl Push {
                             true => (place.plain(light, link), 0),
                             false => place.weight(light, link, push.means[at], rays),
                         };
-                        let (weight, shot) = take(&mut known, link).map_or_else(find, |weight| (weight, 0));
+                        let brings = (push.means[at] * visible(link, Spread::Exact), place.uneven);
+                        let known = known.as_mut().and_then(|known| known.take(light, link, brings));
+                        let (weight, shot) = known.map_or_else(find, |weight| (weight, 0));
                         weight.keep(slot);
                         rays += shot;
                     }
@@ -386,8 +388,10 @@ struct Place {
     much: f32,
     /// Senders that bring less than this are not resolved into parts (largest channel), …
     negligible: f32,
-    /// … and links that bring less are not looked at closely (sum of channels).
+    /// … links that bring less are not looked at closely (sum of channels), …
     faint: f32,
+    /// … and no weights are found anew for less (sum of channels).
+    uneven: f32,
 }
 
 impl Place {
@@ -401,6 +405,7 @@ impl Place {
             much: MUCH * irradiance.element_sum(),
             negligible: NEGLIGIBLE * irradiance.max_element(),
             faint: FAINT_SHARE * error.sqrt() * irradiance.element_sum(),
+            uneven: UNEVEN_SHARE * error * irradiance.element_sum(),
         }
     }
 

@@ -363,9 +363,21 @@ impl<L: LightField> Solver<L> {
                 self.settle(pass, &mut stopped, watch);
             }
         }
-        // Roughly it is what it was; but light may come from elsewhere, though it is as much.
-        self.sent.iter_mut().for_each(Sent::forget);
+        self.forget_reshaped(stopped);
         self.solve(&mut |progress| if stopped { ControlFlow::Break(()) } else { watch(progress) });
+    }
+
+    /// Has those leaves reflected anew at which light comes from elsewhere than it did, though it may be as much.
+    fn forget_reshaped(&mut self, stopped: bool) {
+        // What has been shot is not known by link.
+        let known = self.kept_weights.as_mut().filter(|_| !stopped && self.settings.transport == Transport::Gather);
+        let now = (&self.links, self.gather.arriving());
+        let reshaped = known.map(|known| known.reshaped(&self.elements, now));
+        for (node, sent) in self.sent.iter_mut().enumerate() {
+            if reshaped.as_ref().is_none_or(|share| share[node] > self.settings.error) {
+                sent.forget();
+            }
+        }
     }
 
     /// Lets light settle anew over the links that there are, for which it is found out how they reach leaves where it is not
@@ -707,7 +719,7 @@ impl<L: LightField> Solver<L> {
         let error = tolerance.map(|tolerance| if self.skips.faint_links { tolerance } else { 0.0 });
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
         let known = tolerance.and_then(|_| self.kept_weights.take());
-        let known = known.map(|known| known.with_light(&self.elements, &self.exitant, self.settings.error));
+        let known = known.map(|known| known.with_light(&self.elements, &self.exitant));
         self.gather = Gather::new(self.light(), &self.links, error, (room, known.as_ref()), watch);
         self.kept_weights = known.and_then(KeptWeights::once_more);
         self.prepared = tolerance.is_some();
