@@ -11,6 +11,7 @@
 //! is the same, bit by bit.
 
 mod adaptation;
+pub mod beams;
 pub mod budget;
 mod calibrate;
 mod clock;

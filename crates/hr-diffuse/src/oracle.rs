@@ -2,6 +2,7 @@
 //! with them come bounds of the form factor, and with those of the sender's radiosity a minimum and a maximum
 //! of the irradiance that a link carries.
 
+use crate::beams::Beam;
 use crate::form_factor::IN_PLANE;
 use crate::hierarchy::{Element, Kind, SceneData};
 use crate::{Aabb, Cone, LightKind};
@@ -209,27 +210,13 @@ fn light_bounds(scene: &SceneData, receiver: &Element, sender: &Element) -> Opti
     let (low, high) = if flat { (low.max(0.0), high) } else { (1.0, 1.0) };
     let (near, far) = box_distances(receiver.bounds, sender.bounds);
     let from_sender = toward.cone().opposite();
-    let (spot_min, spot_max) = match light.kind {
-        LightKind::Spot { direction, cos_inner, cos_outer } => {
-            let (least, most) = from_sender.cosines(direction);
-            (spot_ramp(least, cos_inner, cos_outer), spot_ramp(most, cos_inner, cos_outer))
-        }
-        _ => (1.0, 1.0),
-    };
+    let [spot_min, spot_max] = Beam::of(scene, sender).map_or([1.0; 2], |beam| beam.ramp(receiver));
     if spot_max <= 0.0 {
         return None;
     }
     let max = high * spot_max / (near * near).max(1e-12);
     let min = (low * spot_min / (far * far).max(1e-12)).min(max);
     Some(FactorBounds { min, max, from_sender })
-}
-
-/// The ramp of a spot light between its inner and outer cone (`KHR_lights_punctual`, "Inner and Outer Cone
-/// Angles"): the clamped linear function of the cosine, squared.
-#[must_use]
-pub fn spot_ramp(cosine: f32, cos_inner: f32, cos_outer: f32) -> f32 {
-    let t = ((cosine - cos_outer) / (cos_inner - cos_outer).max(1e-4)).clamp(0.0, 1.0);
-    t * t
 }
 
 /// Whether all of `other` lies behind the plane of `element` (or in it); behind all planes of a cluster that faces one way, by

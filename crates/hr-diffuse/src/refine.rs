@@ -5,9 +5,11 @@
 //! not depend on the number of threads.
 
 use crate::Rgb;
+use crate::beams::Beam;
 use crate::budget::{Account, Growth, Spent};
 use crate::clock::Instant;
 use crate::form_factor::{self, Accuracy, Part};
+use crate::geometry::Domain;
 use crate::hierarchy::{Element, Elements, Kind};
 use crate::hooks::LightField;
 use crate::links::Link;
@@ -438,6 +440,16 @@ fn decide<L: LightField>(
     {
         return verdict;
     }
+    let beam = Beam::of(light.scene, s).filter(|beam| beam.ends_on(r));
+    // What is not flat is lit as its middle is, and may be lit elsewhere only; as long as all is dark no error tells that this matters.
+    let dark = light.exitant.irradiance[0] == Rgb::ZERO;
+    if beam.is_some()
+        && !r.is_flat()
+        && (dark || weight * interval.most > tolerance.error)
+        && let Some(verdict) = split(choose(light, pair, tolerance, false))
+    {
+        return verdict;
+    }
     if by_bounds > tolerance.error {
         let prefer_sender = RADIOSITY_SHARE * interval.radiosity > interval.geometry;
         if let Some(verdict) = split(choose(light, pair, tolerance, prefer_sender)) {
@@ -447,7 +459,7 @@ fn decide<L: LightField>(
     // What visibility is worth: rays in proportion to the light at stake, and a split where it is uneven.
     let stake = |link: &Link| weight * interval.most.min(4.0 * estimate(light, link));
     let split_by_shadow = |link: &Link| {
-        let partial = link.visibility > 0.0 && link.visibility < 1.0;
+        let partial = link.visibility > 0.0 && link.visibility < 1.0 || beam.is_some();
         if partial && stake(link) > tolerance.error { split(choose(light, pair, tolerance, false)) } else { None }
     };
     // What corners of the receiver tell of a shadow's edge, which segments from all over it miss or take for a soft one.
@@ -583,13 +595,21 @@ fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) ->
         return factor_at(r.center, direction);
     }
     let normal = r.normals.axis;
-    let clear = distance - s.radius;
-    let reach = if clear > 0.0 { r.radius / clear } else { f32::INFINITY };
     let geometry = &light.scene.surfaces()[r.source as usize];
-    let receiver = Part { geometry, domain: r.domain, back: r.kind == Kind::Back };
     let accuracy = Accuracy { relative: f64::from(relative), absolute: 0.0, most: FACTOR_POINTS };
     let factor = |x: DVec3, _| f64::from(factor_at(x.as_vec3(), normal));
-    form_factor::mean_factor(receiver, accuracy, f64::from(reach), factor).value as f32
+    let mean = |domain: Domain, radius: f32, clear: f32| {
+        let reach = if clear > 0.0 { radius / clear } else { f32::INFINITY };
+        let receiver = Part { geometry, domain, back: r.kind == Kind::Back };
+        form_factor::mean_factor(receiver, accuracy, f64::from(reach), factor).value as f32
+    };
+    match Beam::of(light.scene, s) {
+        Some(beam) => beam.mean_over(geometry, r.domain, &|part| {
+            let bounds = geometry.bounds(part);
+            mean(part, bounds.radius(), bounds.center().distance(s.center))
+        }),
+        None => mean(r.domain, r.radius, distance - s.radius),
+    }
 }
 
 /// Irradiance that a link would carry unoccluded (max channel).

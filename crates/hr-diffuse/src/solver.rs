@@ -1,6 +1,7 @@
 //! The solver: refine, gather, push, reflect, pull, until the light has settled (paper, sections 3.1 to 3.3).
 
 use crate::adaptation::adaptation;
+use crate::beams::solid_angle;
 use crate::budget::{Account, Budget, Spent};
 use crate::clock::Instant;
 use crate::convergence::Convergence;
@@ -837,7 +838,7 @@ impl<L: LightField> Solver<L> {
         for light in &self.scene.lights {
             let spread = match light.kind {
                 LightKind::Directional { .. } => self.area,
-                _ => 4.0 * std::f32::consts::PI,
+                LightKind::Point | LightKind::Spot { .. } => solid_angle(light.kind),
             };
             power += f64::from(light.intensity.max_element() * spread);
         }

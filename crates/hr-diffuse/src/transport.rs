@@ -1,10 +1,10 @@
 //! The exitant light of every node, and what of it arrives at a point.
 
+use crate::beams::spot_ramp;
 use crate::form_factor::{self, CURVED_FAR, FAR};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField, NodeId};
 use crate::links::Link;
-use crate::oracle::spot_ramp;
 use crate::reflect::{Representative, Senders};
 use crate::{Cone, Facing, LightKind, Rgb};
 use glam::Vec3;

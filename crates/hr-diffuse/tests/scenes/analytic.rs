@@ -235,3 +235,38 @@ fn no_ray_contradicts_a_proof() {
     // Rays that graze an edge where surfaces meet count as blocked.
     assert!(10_000 * contradicted <= 64 * proved as u32, "{contradicted} segments are blocked that are proved free");
 }
+
+/// All light of a spot arrives at the walls of a room, however narrow its cone: 2π I times the mean of its ramp, t² over cosines,
+/// which is what is within the inner cone and a third of the rest.
+#[test]
+fn spots_of_all_widths_arrive() {
+    let wall = DiffuseMaterial { reflectance: Rgb::splat(1e-3), exitance: Rgb::ZERO, two_sided: false };
+    let mut wrong = Vec::new();
+    for degrees in [60.0_f64, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5] {
+        for target in [DVec3::new(0.3, -0.2, -2.0), DVec3::new(2.0, 0.4, -0.7), DVec3::new(-2.0, -2.0, -2.0)] {
+            let (inner, outer) = ((0.7 * degrees).to_radians().cos(), degrees.to_radians().cos());
+            let position = DVec3::new(0.2, 0.3, 1.5);
+            let direction = (target - position).normalize().as_vec3();
+            let kind = LightKind::Spot { direction, cos_inner: inner as f32, cos_outer: outer as f32 };
+            let lights = vec![Light { position, intensity: Rgb::ONE, kind }];
+            let input = SceneInput { surfaces: cube(4.0), materials: vec![wall], lights, ..SceneInput::default() };
+            let solution = solve(&input, 0.1);
+            let power = |leaf: u32| {
+                let element = &solution.elements.nodes[leaf as usize];
+                f64::from(element.area * solution.exitant.irradiance[leaf as usize].x)
+            };
+            let unit = f64::from(solution.elements.nodes[0].area) / 96.0;
+            let arrived: f64 = solution.elements.patch_leaves().map(power).sum::<f64>() / unit;
+            let emitted = 2.0 * PI * ((1.0 - inner) + (inner - outer) / 3.0);
+            println!(
+                "{degrees}° toward {target}: {arrived} of {emitted}: {} links {}",
+                arrived / emitted,
+                solution.stats.links
+            );
+            if (arrived / emitted - 1.0).abs() > 0.01 {
+                wrong.push(format!("{degrees}° toward {target}: {arrived} of {emitted}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}

@@ -3,7 +3,7 @@
 
 use super::nearby::Nearby;
 use glam::{Vec2, Vec3};
-use hr_diffuse::oracle::spot_ramp;
+use hr_diffuse::beams::spot_ramp;
 use hr_diffuse::{Domain, Geometry, Light, LightKind, Normalization, Rgb, Shape, Surface};
 use hr_scene::Scene;
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
