@@ -1,6 +1,6 @@
-//! Weights of leaves that stay when something has moved: those for senders that shine as they did, where nothing came or went
-//! between leaf and sender. Leaves need not look for themselves again what these bring. Which links of theirs are
-//! still fine enough is told from the same light.
+//! What leaves found out that stays when something has moved: weights for senders that shine as they did, or matter little, where
+//! nothing came or went between leaf and sender. Leaves need not look for themselves again what these bring. Which of their links are
+//! fine enough still, and which leaves receive light from elsewhere now, is told from the same.
 
 use crate::Rgb;
 use crate::gather::Gather;

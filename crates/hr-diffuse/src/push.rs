@@ -173,8 +173,8 @@ impl Push {
                             true => (place.plain(light, link), 0),
                             false => place.weight(light, link, push.means[at], rays),
                         };
-                        let brings = (push.means[at] * visible(link, Spread::Exact), place.uneven);
-                        let known = known.as_mut().and_then(|known| known.take(light, link, brings));
+                        let brings = push.means[at] * visible(link, Spread::Exact);
+                        let known = known.as_mut().and_then(|known| known.take(light, link, (brings, place.uneven)));
                         let (weight, shot) = known.map_or_else(find, |weight| (weight, 0));
                         weight.keep(slot);
                         rays += shot;
