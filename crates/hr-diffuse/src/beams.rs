@@ -77,7 +77,9 @@ impl Beam {
         let to = bounds.center() - self.position;
         // Of nearly parallel directions the sine tells more than the cosine.
         let angle = self.direction.cross(to).length().atan2(self.direction.dot(to));
-        (angle, (bounds.radius() / to.length()).min(1.0).asin())
+        let (radius, distance) = (bounds.radius(), to.length());
+        // From within it is seen all around.
+        (angle, if radius < distance { (radius / distance).asin() } else { PI })
     }
 
     /// Mean over a part of a surface of what `mean` finds for parts of it that light falls on evenly, or that are small.

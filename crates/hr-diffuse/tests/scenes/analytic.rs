@@ -243,7 +243,9 @@ fn spots_of_all_widths_arrive() {
     let wall = DiffuseMaterial { reflectance: Rgb::splat(1e-3), exitance: Rgb::ZERO, two_sided: false };
     let mut wrong = Vec::new();
     for degrees in [60.0_f64, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5] {
-        for target in [DVec3::new(0.3, -0.2, -2.0), DVec3::new(2.0, 0.4, -0.7), DVec3::new(-2.0, -2.0, -2.0)] {
+        let targets =
+            [DVec3::new(0.3, -0.2, -2.0), DVec3::new(2.0, 0.4, -0.7), DVec3::splat(-2.0), DVec3::new(0.1, 0.4, 2.0)];
+        for target in targets {
             let (inner, outer) = ((0.7 * degrees).to_radians().cos(), degrees.to_radians().cos());
             let position = DVec3::new(0.2, 0.3, 1.5);
             let direction = (target - position).normalize().as_vec3();
