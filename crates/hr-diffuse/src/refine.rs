@@ -60,6 +60,8 @@ const FIRST_SEGMENTS: u32 = 4;
 /// So many where elements are near each other: the light that passes varies over them, and its mean errs to one side.
 const NEAR_SEGMENTS: u32 = 16;
 const MOST_SEGMENTS: u32 = 32;
+/// The same where none has been free.
+const MOST_BLOCKED: u32 = 1024;
 
 /// Nodes nearer than this many times the sum of their radii may be parts of one convex object, …
 const NEIGHBOURS: f32 = 2.0;
@@ -87,6 +89,8 @@ pub(crate) struct Tolerance {
     pub(crate) kept_too: bool,
     /// Radius in unit space below which elements are not split.
     pub(crate) smallest: f32,
+    /// Whether nothing has been lit by the passes before: then no error tells what is worth to be looked for.
+    pub(crate) dark: bool,
     /// Pairs that need no link.
     pub(crate) skips: Skips,
 }
@@ -475,7 +479,8 @@ fn decide<L: LightField>(
         counters.edges.fetch_add(u64::from(found), Ordering::Relaxed);
         found.then_some(Verdict::SplitReceiver)
     };
-    if let Some(link) = candidate.own() {
+    // What let nothing through is looked at again: by as many segments as the light that there is now asks for.
+    if let Some(link) = candidate.own().filter(|link| link.visibility != 0.0) {
         let by_edge = || if tolerance.kept_too { split_by_edge(&link) } else { None };
         return split_by_shadow(&link).or_else(by_edge).unwrap_or(Verdict::Keep(link));
     }
@@ -510,8 +515,17 @@ fn decide<L: LightField>(
     }
     let (worth, seed) = ((first as f32 * stake(&link) / tolerance.error) as u32, hash(pair.receiver, pair.sender));
     let (mut blocker, mut seen, mut total, mut done) = (u32::MAX, 0.0, 0.0, 0);
-    // A few at first: those of a pair that is split then are not missed.
-    for segments in [first, worth.clamp(first, MOST_SEGMENTS)] {
+    // A few at first: those of a pair that is split then are not missed. Where none is free, so many that what they may miss counts no more
+    // than what a link may be wrong by.
+    let enough = [
+        first,
+        worth.clamp(first, MOST_SEGMENTS),
+        if tolerance.dark { MOST_BLOCKED } else { worth.clamp(first, MOST_BLOCKED) },
+    ];
+    for segments in enough {
+        if segments > MOST_SEGMENTS && seen > 0.0 {
+            break;
+        }
         let start = Instant::now();
         let (free, all, rays) =
             segments::visibility(light, pair.receiver, pair.sender, (seed, done..segments), (&proof, &mut blocker));

@@ -15,14 +15,13 @@ use crate::Aabb;
 use crate::geometry::Domain;
 use crate::hierarchy::Element;
 use crate::sampling::{cosine_direction, hash, point4};
-use crate::sealed::{ROUNDS, Side, Spots, is_back};
+use crate::sealed::{MOST_LEAVING, ROUNDS, Side, Spots, is_back};
 use crate::threads::prelude::*;
 
 /// Lit groups are joined by so many rays of each spot at most.
 const MOST_RAYS: usize = 16;
-/// A group is closed if of so many rays no more than this share meet nothing.
+/// A group is closed if of so many rays no more than [`MOST_LEAVING`] meet nothing.
 const RAYS: usize = 64;
-const MOST_LEAVING: f32 = 0.25;
 
 /// No room, or several and something else.
 pub(crate) const NO_ROOM: u32 = u32::MAX;

@@ -47,6 +47,13 @@ const FLUSH: f32 = 1e-5;
 /// A point is joined to so many of the spots around it.
 const NEAREST: usize = 6;
 
+/// So many rays of a dark group tell whether it is an interior, of which no more than this share leaves the scene, …
+const FIRST_WINDOW_RAYS: usize = 64;
+pub(crate) const MOST_LEAVING: f32 = 0.25;
+/// … and so many whether it has a window, if it is so large (radius in unit space); fewer, by area, of smaller ones.
+const MOST_WINDOW_RAYS: usize = 16_384;
+const LARGEST: f32 = 0.25;
+
 /// No spot.
 const NONE: u32 = u32::MAX;
 
@@ -62,7 +69,7 @@ pub(crate) fn is_back(side: Side) -> bool {
 /// light, and do nothing else with it.
 ///
 /// A side that sees lit ones in less than about a hundredth of its view, or of that of the group that it belongs to, may
-/// be missed.
+/// be missed, but not in a large interior that light may come into from outside.
 pub(crate) fn lit_sides(scene: &SceneData, idle: &[bool]) -> (Vec<[bool; 2]>, Rooms, Vec<[u32; 2]>) {
     let mut spots = Spots::new(scene, idle);
     // What emitters see is lit; few rays from elsewhere would find a small one.
@@ -78,6 +85,7 @@ pub(crate) fn lit_sides(scene: &SceneData, idle: &[bool]) -> (Vec<[bool; 2]>, Ro
         spots.explore(&looking, first, rays);
         first += rays;
     }
+    spots.open_up();
     let mut lit = vec![[false; 2]; scene.surfaces().len()];
     for spot in 0..spots.all.len() as u32 {
         let side = spots.all[spot as usize].side;
@@ -265,6 +273,44 @@ impl<'a> Spots<'a> {
             }
         }
         seen
+    }
+
+    /// Takes large interiors for lit that a ray leaves, as by a window: light that comes in there may fall where no ray from them goes.
+    fn open_up(&mut self) {
+        self.groups.flatten();
+        let mut dark = vec![Vec::new(); self.all.len()];
+        for spot in (0..self.all.len() as u32).filter(|&spot| !self.groups.is_known_lit(spot)) {
+            if self.place(spot).is_some() {
+                dark[self.groups.known_root(spot)].push(spot);
+            }
+        }
+        let dark: Vec<Vec<u32>> = dark.into_iter().filter(|spots| !spots.is_empty()).collect();
+        let open: Vec<bool> = dark.par_iter().map(|spots| self.has_window(spots)).collect();
+        for (spots, _) in dark.iter().zip(open).filter(|(_, open)| *open) {
+            self.groups.light(spots[0]);
+        }
+    }
+
+    /// Whether some ray from spots of large sides leaves the scene, but most do not.
+    fn has_window(&self, spots: &[u32]) -> bool {
+        let bounds = Aabb::of_points(spots.iter().filter_map(|&spot| self.place(spot)));
+        let size = (bounds.radius() / LARGEST).min(1.0);
+        let rays = ((MOST_WINDOW_RAYS as f32 * size * size) as usize).max(FIRST_WINDOW_RAYS);
+        let leaves = |ray: &usize| {
+            let spot = spots[ray % spots.len()];
+            let Spot { side, at, .. } = self.all[spot as usize];
+            let n = outward(&self.scene.surfaces()[(side / 2) as usize], side);
+            let u = point4(hash(spot, 0x0be2), *ray as u32);
+            let direction = cosine_direction(n, u.z, u.w);
+            let (a, b) = n.any_orthonormal_pair();
+            // Rays that slip through between surfaces that nearly meet have none beside them.
+            [Vec3::ZERO, a * BESIDE, b * BESIDE]
+                .into_iter()
+                .all(|aside| self.scene.visibility.first_side(at, direction + aside, f32::MAX, side / 2).is_none())
+        };
+        let first = (0..FIRST_WINDOW_RAYS).filter(leaves).count();
+        let is_interior = first as f32 <= MOST_LEAVING * FIRST_WINDOW_RAYS as f32;
+        is_interior && (first > 0 || (FIRST_WINDOW_RAYS..rays).any(|ray| leaves(&ray)))
     }
 
     /// What a ray from a spot meets that is not known to be of its group.

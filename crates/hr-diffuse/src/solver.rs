@@ -597,6 +597,7 @@ impl<L: LightField> Solver<L> {
                 f32::INFINITY
             },
             kept_too: !self.edges_known,
+            dark: self.stats.iterations > 0 && self.exitant.irradiance[0] == Rgb::ZERO,
             smallest: SMALLEST_SHARE * pass.tolerance.sqrt() * self.elements.rooms.size,
             skips: self.skips,
         };

@@ -15,3 +15,4 @@ mod relight;
 mod resume;
 mod shadows;
 mod shooting;
+mod windows;
