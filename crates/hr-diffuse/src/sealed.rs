@@ -85,11 +85,12 @@ pub(crate) fn lit_sides(scene: &SceneData, idle: &[bool]) -> (Vec<[bool; 2]>, Ro
         spots.explore(&looking, first, rays);
         first += rays;
     }
-    spots.open_up();
+    let windows = spots.windows();
     let mut lit = vec![[false; 2]; scene.surfaces().len()];
     for spot in 0..spots.all.len() as u32 {
         let side = spots.all[spot as usize].side;
-        lit[(side / 2) as usize][(side % 2) as usize] |= spots.groups.is_lit(spot);
+        let may_be_lit = spots.groups.is_lit(spot) || windows[spots.groups.root(spot)];
+        lit[(side / 2) as usize][(side % 2) as usize] |= may_be_lit;
     }
     if !lit.iter().flatten().any(|lit| *lit) {
         lit.fill([true; 2]);
@@ -275,8 +276,9 @@ impl<'a> Spots<'a> {
         seen
     }
 
-    /// Takes large interiors for lit that a ray leaves, as by a window: light that comes in there may fall where no ray from them goes.
-    fn open_up(&mut self) {
+    /// By root, whether its group is a large interior that is dark, but that a ray leaves, as by a window: light that comes in there
+    /// may fall where no ray from within goes.
+    fn windows(&mut self) -> Vec<bool> {
         self.groups.flatten();
         let mut dark = vec![Vec::new(); self.all.len()];
         for spot in (0..self.all.len() as u32).filter(|&spot| !self.groups.is_known_lit(spot)) {
@@ -284,11 +286,7 @@ impl<'a> Spots<'a> {
                 dark[self.groups.known_root(spot)].push(spot);
             }
         }
-        let dark: Vec<Vec<u32>> = dark.into_iter().filter(|spots| !spots.is_empty()).collect();
-        let open: Vec<bool> = dark.par_iter().map(|spots| self.has_window(spots)).collect();
-        for (spots, _) in dark.iter().zip(open).filter(|(_, open)| *open) {
-            self.groups.light(spots[0]);
-        }
+        dark.par_iter().map(|spots| !spots.is_empty() && self.has_window(spots)).collect()
     }
 
     /// Whether some ray from spots of large sides leaves the scene, but most do not.

@@ -260,11 +260,6 @@ fn spots_of_all_widths_arrive() {
             let unit = f64::from(solution.elements.nodes[0].area) / 96.0;
             let arrived: f64 = solution.elements.patch_leaves().map(power).sum::<f64>() / unit;
             let emitted = 2.0 * PI * ((1.0 - inner) + (inner - outer) / 3.0);
-            println!(
-                "{degrees}° toward {target}: {arrived} of {emitted}: {} links {}",
-                arrived / emitted,
-                solution.stats.links
-            );
             if (arrived / emitted - 1.0).abs() > 0.01 {
                 wrong.push(format!("{degrees}° toward {target}: {arrived} of {emitted}"));
             }
