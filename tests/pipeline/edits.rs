@@ -143,7 +143,6 @@ fn moved_things_reflect_few_leaves_anew() {
     let first = reflected(&solver);
     solver.rearrange(&hall(1.5).input, &mut |_| ControlFlow::Continue(())).expect("a box in another place");
     let share = 100 * (reflected(&solver) - first) / first;
-    println!("{share} %");
     assert!(share < BAR, "{share} % of what the solve reflected");
     let off = difference(&fronts(&solver), &fronts(&solved(&hall(1.5))));
     assert!(off < 0.5 * ERROR, "off by {off}");
