@@ -33,13 +33,12 @@ fn absorbed(surfaces: Vec<Surface>, lights: Vec<Light>) -> f64 {
     let input = SceneInput { surfaces, materials: vec![wall, lamp(Rgb::ONE)], lights, ..SceneInput::default() };
     let mut solver = Solver::new(&input, Settings::with_error(0.1), ()).expect("the room is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
-    let solution = solver.finish(&mut |_| ControlFlow::Continue(()));
-    let nodes = &solution.elements.nodes;
+    let (elements, nodes) = (solver.elements(), &solver.elements().nodes);
     let of_room = |leaf: &u32| nodes[*leaf as usize].material == 0;
-    let power = |leaf: u32| f64::from(nodes[leaf as usize].area * solution.exitant.irradiance[leaf as usize].x);
-    let all: f64 = solution.elements.patch_leaves().filter(of_room).map(power).sum();
+    let power = |leaf: u32| f64::from(nodes[leaf as usize].area * solver.exitant().irradiance[leaf as usize].x);
+    let all: f64 = elements.patch_leaves().filter(of_room).map(power).sum();
     // The floor has 16 m², in unit space something else.
-    let floor = solution.elements.surface_nodes[0][0];
+    let floor = elements.surface_nodes[0][0];
     assert!(floor != u32::MAX, "the room is taken for one that no light reaches");
     all * f64::from(1.0 - REFLECTANCE) * 16.0 / f64::from(nodes[floor as usize].area)
 }
