@@ -123,6 +123,7 @@ fn lobes_turn_with_a_lamp_that_moves() {
     assert!(difference(&before[1..], &fresh[1..]) > 1.0, "the other screen is lit: {before:?} {fresh:?}");
     solver.rearrange(&left.input, &mut |_| ControlFlow::Continue(())).expect("a lamp elsewhere");
     let off = difference(&fronts(&solver)[1..], &fresh[1..]);
+    // The screens get next to nothing else than the lobe of a plate of few leaves: either solve may be off by half of the error there.
     assert!(off < ERROR, "off by {off}: {:?} {fresh:?}", fronts(&solver));
 }
 

@@ -119,6 +119,7 @@ fn pairs_that_hardly_face_each_other_change_little() {
     const ERROR: f32 = 0.05;
     let with = solve(&room(), ERROR, (), Skips::ALL);
     let without = solve(&room(), ERROR, (), Skips { averted: false, ..Skips::ALL });
+    // Pairs through whose links nothing comes are decided upon in each pass: counts of verdicts tell passes, too.
     let [fewer, all] = [&with, &without].map(|solver| solver.stats.links);
     assert!(fewer < all, "{fewer} of {all} links are left, as the others' ends cannot face each other");
     let apart = difference(&radiosities(&with), &radiosities(&without), with.exitant.radiosity[0]);
