@@ -5,7 +5,7 @@
 //! its direction, extent and irradiance are renewed from at a point ([`glossy_ext::arriving`]).
 
 use crate::facets::NO_LEAF;
-use crate::glossy::{FOLLOWED, NARROWEST};
+use crate::glossy::NARROWEST;
 use crate::solved::Solved;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
@@ -19,6 +19,9 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 /// What tells whether a lobe is narrow: its width toward this direction.
 const ASLANT: Vec3 = Vec3::new(0.6, 0.0, 0.8);
 
+/// Lobes narrower than this (standard deviation in radians, about 8°) show more than samples tell: one of a link stands for too much
+/// of what is to be seen in them.
+const NARROW: f32 = 0.14;
 /// In narrow lobes one sees that senders without a known outline, which lie side by side, count as disks. So much wider they
 /// close the gaps between them: where they are equal each direction is in two of them on average.
 const OVERLAP: f32 = 1.5;
@@ -284,7 +287,7 @@ impl Reflectors {
     fn add(&mut self, reflector: &dyn Reflector) -> Option<u32> {
         let lobes = reflector.formulas().filter(|_| reflector.mirror() == Rgb::ZERO)?;
         let begin = self.numbers.len();
-        let is_narrow = reflector.lobe(ASLANT).width < FOLLOWED;
+        let is_narrow = reflector.lobe(ASLANT).width < NARROW;
         let grain = reflector.grain();
         let (narrowest, overlap) = if is_narrow { (NARROWEST, OVERLAP) } else { (0.0, 1.0) };
         self.numbers.push([lobes.len() as f32, narrowest, if grain.is_some() { 1.0 } else { 0.0 }, overlap]);

@@ -7,10 +7,7 @@ use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector, SHOWN_COSINE, a
 use hr_diffuse::{LightField, NodeId, Rgb, Solution};
 use std::f32::consts::FRAC_1_PI;
 
-/// Lobes narrower than this (standard deviation in radians, about 8°) show more than samples tell: one of a link stands
-/// for too much of what is to be seen in them. Rays follow them where there are rays, as in the paper's final ray caster.
-pub(crate) const FOLLOWED: f32 = 0.14;
-/// Where there are none, senders count as at least so wide (standard deviation in radians, about 1.7°): as in light
+/// Where samples are reflected, senders count as at least so wide (standard deviation in radians, about 1.7°): as in light
 /// transport, and so that a highlight between two vertices does not vanish.
 pub(crate) const NARROWEST: f32 = 0.03;
 
@@ -20,7 +17,7 @@ pub enum Mode {
     /// evaluate the outgoing distributions (the paper's walkthrough, section 5)
     #[default]
     Distributions,
-    /// reflect the incident samples at each pixel (section 3.4)
+    /// reflect what arrives at each pixel: in images along rays, in walks the incident samples (section 3.4)
     Samples,
     /// final gather: one bounce of rays reads the solution, light of emitters comes by shadow rays; for stills
     Gather,

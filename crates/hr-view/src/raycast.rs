@@ -4,7 +4,7 @@
 //! vertices, and the glossy part as the [`Mode`] says. A final gather does that only one reflection later: the paths of
 //! a [path tracer](crate::path_tracer) end where they meet the solution, whose elements and mistakes are then seen blurred.
 
-use crate::glossy::{self, FOLLOWED, Mode, NARROWEST};
+use crate::glossy::{self, Mode, NARROWEST};
 use crate::path_tracer::{Glow, Known, Nearby, PathTracer, Place as Lit, Ray, Sampler};
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::haar::Haar;
@@ -58,6 +58,8 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     mode: Mode,
     /// Rays per pixel are this squared.
     grid: u32,
+    /// Lobes narrower than this (radians) are followed by rays.
+    followed: f32,
     /// For final gathers, and for what is in narrow lobes.
     tracer: PathTracer<'a>,
     /// Nodes that glow, rising.
@@ -133,13 +135,22 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let nodes = if mode == Mode::Gather { solution.elements.nodes.len() } else { 0 };
         let nearby = std::iter::repeat_with(OnceLock::new).take(nodes).collect();
         let glowing = glowing.iter().map(|&(node, _)| node).collect();
-        Self { scene, solution, mode, grid: 3, tracer, glowing, nearby }
+        Self { scene, solution, mode, grid: 3, followed: f32::INFINITY, tracer, glowing, nearby }
     }
 
     /// Rays per pixel, squared: 1…16. 3 by default. A final gather has more of them in proportion.
     #[must_use]
     pub fn with_grid(self, grid: u32) -> Self {
         Self { grid: grid.clamp(1, 16), ..self }
+    }
+
+    /// With [`Mode::Samples`]: lobes narrower than `width` (standard deviation in radians) are followed by rays, in wider ones
+    /// the samples are reflected that arrive. All are followed by default, as a sample stands for all of a sender, which looks
+    /// different from each place where it is glossy itself, and is more than a lobe's width across where it is near. 0 is the paper's
+    /// section 3.4, as the window's graphics device does it.
+    #[must_use]
+    pub fn with_followed(self, width: f32) -> Self {
+        Self { followed: width, ..self }
     }
 
     /// The image that a camera takes: linear radiance, W/(m² sr). `watch` is told the share that is done.
@@ -314,9 +325,9 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         Met { hit, leaf, normal, away, reflector }
     }
 
-    /// The lobe toward the ray's origin; none where it is so narrow that it is followed.
+    /// The lobe toward the ray's origin; none where it is followed.
     fn lobe(&self, met: &Met) -> Option<Lobe> {
-        Some(met.reflector.lobe(met.place().local(met.away))).filter(|lobe| lobe.width >= FOLLOWED)
+        Some(met.reflector.lobe(met.place().local(met.away))).filter(|lobe| lobe.width >= self.followed)
     }
 
     /// Glossy radiance from the samples that arrive at the point.
@@ -330,7 +341,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         glossy::interpolated(self.solution, &corners, (met.hit.point, met.normal), met.away)
     }
 
-    /// Glossy radiance from the samples that arrive at the point, or along rays where the lobe is narrow.
+    /// Glossy radiance along rays, or from the samples that arrive at the point where the lobe is wide.
     fn reflected(&self, met: &Met, bounce: u32, sampler: &Sampler, shared: &mut Shared) -> Rgb {
         let mirror = met.reflector.mirror();
         let mut light = Rgb::ZERO;

@@ -1,7 +1,7 @@
 //! Final gathers against the path tracer: they share paths, but not what is at their ends.
 
 use glam::dvec3;
-use glossy_ext::Lambert;
+use glossy_ext::{Lambert, Ward};
 use hr_diffuse::{Light, LightKind, Settings, Shape, Surface};
 use hr_scene::{Camera, Material, Rgb, Scene};
 use hr_view::Mode;
@@ -52,6 +52,25 @@ fn final_gathers_are_nearer_to_the_truth_than_their_solutions() {
         assert!(gathered < most, "{name}: gather is {gathered} off");
         assert!(gathered < reflected, "{name}: gather is {gathered} off, the solution {reflected}");
     }
+}
+
+/// Where all is glossy a sample stands for a sender that looks different from each place: rays tell more than samples do.
+#[test]
+fn rays_into_lobes_are_nearer_to_the_truth_than_samples() {
+    let mut scene = Scene::load("cornell").expect("built in");
+    scene.materials[0].reflector = Arc::new(Ward::new(Rgb::splat(0.15), Rgb::splat(0.6), 0.2).expect("a gloss"));
+    let scene = Arc::new(scene);
+    let camera = Camera { width: 64, height: 48, ..scene.cameras[0].1 };
+    let rays = path_tracer::visibility(&scene).expect("sound");
+    let right = PathTracer::new(&scene, &rays).render(&camera, 256, 1, &|_| ());
+    let right = blocks(&right.image, &camera);
+    let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.2), false, &mut |_| ControlFlow::Continue(()))
+        .expect("solvable");
+    let [followed, reflected] = [f32::INFINITY, 0.0].map(|width| {
+        let caster = RayCaster::new(&scene, &solved.solution, Mode::Samples).with_followed(width);
+        difference(&blocks(&caster.render(&camera, &|_| ()), &camera), &right, 1.0)
+    });
+    assert!(followed < 0.06 && followed < 0.6 * reflected, "off by {followed}, samples by {reflected}");
 }
 
 #[test]

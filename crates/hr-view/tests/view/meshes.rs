@@ -92,8 +92,10 @@ fn a_floor_shows_the_same_in_many_pieces() {
 fn rays_of_a_pixel_see_what_its_middle_shows() {
     let gloss = Ward::new(Rgb::splat(0.2), Rgb::splat(0.5), 0.2).expect("a gloss");
     let solved = solved(&floor(1, gloss));
-    let shared = picture(&solved, Mode::Samples, 3, 96);
-    let apart = picture(&solved, Mode::Samples, 1, 288);
+    let [shared, apart] = [(3, 96), (1, 288)].map(|(grid, width)| {
+        let caster = RayCaster::new(&solved.scene, &solved.solution, Mode::Samples).with_grid(grid).with_followed(0.0);
+        caster.render(&camera(width), &|_| ())
+    });
     let off = difference(&means(&shared, 2), &means(&apart, 6));
     assert!(off < 0.005, "{off} of the light");
 }

@@ -57,8 +57,10 @@ struct Truth {
 }
 
 impl Truth {
-    fn new(solved: &Solved, camera: &Camera) -> Self {
-        let caster = RayCaster::new(&solved.scene, &solved.solution, Mode::Samples).with_grid(2);
+    /// Lobes narrower than `followed` (radians) are followed by rays.
+    fn new(solved: &Solved, camera: &Camera, followed: f32) -> Self {
+        let caster =
+            RayCaster::new(&solved.scene, &solved.solution, Mode::Samples).with_grid(2).with_followed(followed);
         let light = caster.render(camera, &|_| ()).pixels;
         let surfaces = surfaces(solved, camera);
         let (width, height) = (camera.width as usize, camera.height as usize);
@@ -106,7 +108,7 @@ fn decoded(code: u8) -> f32 {
     if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Every formula with a lobe wide enough that the ray caster reflects samples, too, instead of following it.
+/// Every formula, in lobes that are wide enough for samples, with the ray caster reflecting them, too.
 #[test]
 fn pixels_agree_with_the_ray_caster() {
     let white = Rgb::new(0.5, 0.45, 0.4);
@@ -128,7 +130,7 @@ fn pixels_agree_with_the_ray_caster() {
         let solved = solved(box_of(reflector), 0.5);
         for (view, camera) in &solved.scene.cameras {
             let camera = Camera { width: 80, height: 80, ..*camera };
-            let truth = Truth::new(&solved, &camera);
+            let truth = Truth::new(&solved, &camera, 0.0);
             let tone = truth.tone();
             let walk = Walkthrough::new(Arc::clone(&solved), Mode::Samples);
             let Some(picture) = draw(&walk, &camera, &tone) else { return };
@@ -146,7 +148,7 @@ fn highlights_have_the_outline_of_their_lamp() {
     let (_, camera) = &solved.scene.cameras[0];
     // The highlight, close up.
     let camera = Camera { target: [0.0, -0.4, 0.0], fov_x: 22.0, width: 96, height: 72, ..*camera };
-    let truth = Truth::new(&solved, &camera);
+    let truth = Truth::new(&solved, &camera, f32::INFINITY);
     let tone = truth.tone();
     let walk = Walkthrough::new(Arc::clone(&solved), Mode::Samples);
     let Some(picture) = draw(&walk, &camera, &tone) else { return };
