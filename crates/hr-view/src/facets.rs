@@ -20,13 +20,18 @@ pub struct Roundness {
     pub fine: f32,
     /// … unless it leaves the surface by less than this (share of the scene's size) …
     pub flat_enough: f32,
-    /// … and then at most this (radians).
+    /// … and then at most this (radians), …
     pub coarse: f32,
+    /// … or this where it is glossy: wider chords blur what round metal mirrors.
+    pub glossy: f32,
 }
 
 impl Roundness {
-    /// 8°, or 23° (a sixteenth of a turn, as halving makes them) within 0.5 mm in a room of 10 m.
-    pub const SMOOTH: Self = Self { fine: 0.14, flat_enough: 5e-5, coarse: 0.4 };
+    /// For walks: 8°, or 45° within 1 mm in a room of 10 m, which from a metre away is a pixel; where it is glossy 23° (an eighth and a
+    /// sixteenth of a turn, as halving makes them).
+    pub const WALKED: Self = Self { fine: 0.14, flat_enough: 1e-4, coarse: 0.8, glossy: 0.4 };
+    /// For what is kept: 8°, or 23° within 0.5 mm in a room of 10 m.
+    pub const SMOOTH: Self = Self { fine: 0.14, flat_enough: 5e-5, coarse: 0.4, glossy: 0.4 };
 }
 
 /// Edges this near to their surface (unit space) are never cut: rounding bends very short ones at random.
@@ -342,8 +347,13 @@ impl<'a> Maker<'a> {
             if length > 0.0 { (off - chord * (off.dot(chord) / (length * length))).length() } else { off.length() };
         // An arc of a small angle t over a chord of length 1 is t/8 high.
         let angle = if length > 0.0 { 8.0 * distance / length } else { f32::INFINITY };
-        let Roundness { fine, flat_enough, coarse } = self.roundness;
-        let much = distance >= NEGLIGIBLE && angle >= if distance < flat_enough { coarse } else { fine };
+        let Roundness { fine, flat_enough, coarse, glossy } = self.roundness;
+        let most = match distance < flat_enough {
+            true if look.glossy => glossy,
+            true => coarse,
+            false => fine,
+        };
+        let much = distance >= NEGLIGIBLE && angle >= most;
         much.then_some(Bend { uv, at })
     }
 

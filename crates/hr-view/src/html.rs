@@ -49,7 +49,7 @@ use std::path::Path;
 use vertices::Lattice;
 
 /// How round surfaces are: 14°, or 45° within 3 mm in a room of 10 m.
-const ROUNDNESS: Roundness = Roundness { fine: 0.25, flat_enough: 3e-4, coarse: 0.8 };
+const ROUNDNESS: Roundness = Roundness { fine: 0.25, flat_enough: 3e-4, coarse: 0.8, glossy: 0.8 };
 
 /// What the page's script reads first.
 #[derive(Serialize)]

@@ -41,7 +41,7 @@ impl Walkthrough {
     /// keep their distributions.
     #[must_use]
     pub fn new(solved: Arc<Solved>, mode: Mode) -> Self {
-        let Facets { mesh, sources, leaves: triangles } = facets(&solved.scene, &solved.solution, Roundness::SMOOTH);
+        let Facets { mesh, sources, leaves: triangles } = facets(&solved.scene, &solved.solution, Roundness::WALKED);
         let places = sources.iter().map(|source| source.place(&solved.solution)).collect();
         let (mut leaves, mut first) = (Vec::new(), vec![0]);
         let mut around = Vec::new();

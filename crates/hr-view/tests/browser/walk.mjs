@@ -19,7 +19,10 @@ const browser = spawn(chromium, [
 ], { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
 process.on("exit", () => {
   browser.kill("SIGKILL");
-  rmSync(profile, { recursive: true, force: true, maxRetries: 20 });
+  // Its parts end one after the other, and may write until then; what they leave behind is no fault of the page.
+  try {
+    rmSync(profile, { recursive: true, force: true, maxRetries: 20 });
+  } catch {}
 });
 browser.on("exit", (code) => { console.error(`the browser ended with ${code}`); process.exit(1); });
 
