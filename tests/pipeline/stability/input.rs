@@ -202,7 +202,7 @@ fn hostile_numbers_give_an_error_or_a_finite_answer() {
             let mut watch = |_: &hr_diffuse::Progress| {
                 steps += 1;
                 // A scene stretched beyond measure need not be solved to the end, only without a fault.
-                if steps > 40 { std::ops::ControlFlow::Break(()) } else { std::ops::ControlFlow::Continue(()) }
+                if steps > 15 { std::ops::ControlFlow::Break(()) } else { std::ops::ControlFlow::Continue(()) }
             };
             solver.solve(&mut watch);
             let solution = solver.finish(&mut watch);
