@@ -44,6 +44,8 @@ pub enum Command {
     View(ViewArgs),
     /// The pictures of the guide in docs/, made anew
     Guide(GuideArgs),
+    /// Pictures of built-in scenes beside those that are committed, and what differs: a Markdown table
+    Pictures(PicturesArgs),
 }
 
 /// Of `hr-bench reference`.
@@ -296,6 +298,22 @@ pub struct GuideArgs {
     /// Paths per pixel of the path-traced picture
     #[arg(long, value_name = "N", default_value_t = 256)]
     pub spp: u32,
+}
+
+/// Of `hr-bench pictures`.
+#[derive(Clone, Debug, PartialEq, Eq, Args)]
+pub struct PicturesArgs {
+    /// Where those are that are committed
+    #[arg(long, value_name = "DIR", default_value = "crates/hr-bench/pictures")]
+    pub committed: PathBuf,
+
+    /// Where each goes beside what is committed and the difference
+    #[arg(long, value_name = "DIR", default_value = "target/hr-bench/pictures")]
+    pub out: PathBuf,
+
+    /// Replace what is committed by what is drawn now
+    #[arg(long)]
+    pub accept: bool,
 }
 
 /// Of `hr-bench view`.

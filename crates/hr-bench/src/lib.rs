@@ -17,6 +17,7 @@
 //! | `paper` | what the paper's tables and figures compare |
 //! | `view` | time of frames along a walk |
 //! | `guide` | nothing: it makes the guide's pictures |
+//! | `pictures` | whether built-in scenes look as they did |
 
 pub mod accuracy;
 pub mod args;
@@ -33,6 +34,7 @@ pub mod guide;
 pub mod irradiance;
 pub mod measure;
 pub mod paper;
+pub mod pictures;
 pub mod plot;
 pub mod run;
 mod side_by_side;

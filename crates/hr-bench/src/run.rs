@@ -4,8 +4,8 @@ use crate::args::{AccuracyArgs, Cli, Command, CompareArgs, ReferenceArgs, Thread
 use crate::compare::{compare, luminance};
 use crate::views::{Making, listed, path_traced};
 use crate::{
-    BenchError, accuracy, bounds, curve, edits, float_image, form_factors, frames, growth, guide, paper, threads,
-    transport, visibility,
+    BenchError, accuracy, bounds, curve, edits, float_image, form_factors, frames, growth, guide, paper, pictures,
+    threads, transport, visibility,
 };
 use hr_scene::{Camera, ImageKind, Scene, ToneMap, builtin};
 use hr_view::path_tracer::{self, PathTracer};
@@ -37,6 +37,7 @@ pub fn run(cli: &Cli, out: Out<'_>) -> Result<(), BenchError> {
         Command::Paper(args) => paper::report(args, out),
         Command::View(args) => frames::report(args, out),
         Command::Guide(args) => guide::pictures(args, out),
+        Command::Pictures(args) => pictures::report(args, out),
     }
 }
 
