@@ -1,6 +1,7 @@
 //! From a solution to triangles: the fans of its leaves, curved ones cut until they look round.
 //!
-//! An edge is cut or not by its own ends alone, so that the triangles on both sides of it agree and no crack opens.
+//! An edge is cut or not by its own ends and its surface's gloss alone, so that the triangles on both sides of it agree and no crack
+//! opens. Where surfaces of different gloss meet at a round edge their chords may differ, by less than is [flat enough](Roundness).
 
 use crate::display::{Batch, DisplayMesh};
 use glam::{DVec3, Mat3, Vec2, Vec3};
@@ -348,10 +349,10 @@ impl<'a> Maker<'a> {
         // An arc of a small angle t over a chord of length 1 is t/8 high.
         let angle = if length > 0.0 { 8.0 * distance / length } else { f32::INFINITY };
         let Roundness { fine, flat_enough, coarse, glossy } = self.roundness;
-        let most = match distance < flat_enough {
-            true if look.glossy => glossy,
-            true => coarse,
-            false => fine,
+        let most = match (distance < flat_enough, look.glossy) {
+            (false, _) => fine,
+            (true, true) => glossy,
+            (true, false) => coarse,
         };
         let much = distance >= NEGLIGIBLE && angle >= most;
         much.then_some(Bend { uv, at })

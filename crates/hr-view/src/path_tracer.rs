@@ -44,7 +44,7 @@ const MOST_SURVIVAL: f32 = 0.95;
 const LEAST_ALBEDO: f32 = 0.05;
 /// Emitters among which one is picked at each point of a path.
 const CANDIDATES: u32 = 4;
-/// Of so many emitters each is looked at for what is in narrow lobes.
+/// Of so many emitters each is looked at for what is in lobes that are followed.
 const FEW: usize = 16;
 /// Step from one candidate's place on its emitter to the next one's: the two-dimensional golden ratio, as in
 /// [`hr_diffuse::sampling`].
