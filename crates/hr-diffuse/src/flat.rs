@@ -71,7 +71,7 @@ impl<'a> Writer<'a> {
 
 /// Reads arrays in the order in which they were written. `what` they are is for errors.
 pub struct Reader<'a> {
-    from: &'a mut dyn Read,
+    from: &'a mut (dyn Read + Send),
     /// Bytes that are left.
     left: u64,
     /// A piece of an array, aligned.
@@ -81,7 +81,7 @@ pub struct Reader<'a> {
 impl<'a> Reader<'a> {
     /// From what a [`Writer`] wrote: so many bytes.
     #[must_use]
-    pub fn new(from: &'a mut dyn Read, bytes: u64) -> Self {
+    pub fn new(from: &'a mut (dyn Read + Send), bytes: u64) -> Self {
         Self { from, left: bytes, piece: vec![0; PIECE / size_of::<u128>()] }
     }
 

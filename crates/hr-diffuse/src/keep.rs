@@ -18,6 +18,7 @@ use crate::rooms::Rooms;
 use crate::solution::Solution;
 use crate::solver::scene_by;
 use crate::stats::{Skipped, Stats};
+use crate::threads::{join, prelude::*};
 use crate::transport::Exitant;
 use crate::vertices::{Corner, Vertices};
 use crate::visibility::Visibility;
@@ -26,20 +27,37 @@ use std::io;
 
 /// An extension whose light can be kept.
 pub trait Keep: LightField {
-    /// Writes what the extension keeps of all nodes, and of its own.
+    /// Writes what the extension keeps of a run of nodes.
     ///
     /// # Errors
     /// Those of what is written to.
     fn store(&self, incident: &[Self::Incident], reflected: &[Self::Exitant], out: &mut Writer<'_>) -> io::Result<()>;
 
-    /// Reads it again: incident and exitant light of a hierarchy of so many nodes.
+    /// Reads it again: incident and exitant light of `run` of a hierarchy's nodes, of which there are so many. Called from
+    /// several threads at once, for different runs.
     ///
     /// # Errors
     /// Where it is not what [`store`](Self::store) writes.
-    fn restore(&self, nodes: usize, from: &mut Reader<'_>) -> Result<KeptLight<Self>, FlatError>;
+    fn restore(&self, nodes: usize, run: usize, from: &mut Reader<'_>) -> Result<KeptLight<Self>, FlatError>;
+
+    /// Writes what it keeps beside the light of nodes: nothing unless it says so.
+    ///
+    /// # Errors
+    /// Those of what is written to.
+    fn store_own(&self, _: &mut Writer<'_>) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// Reads it again.
+    ///
+    /// # Errors
+    /// Where it is not what [`store_own`](Self::store_own) writes.
+    fn restore_own(&self, _: &mut Reader<'_>) -> Result<(), FlatError> {
+        Ok(())
+    }
 }
 
-/// Incident and exitant light of every node.
+/// Incident and exitant light of a run of nodes.
 pub type KeptLight<L> = (Vec<<L as LightField>::Incident>, Vec<<L as LightField>::Exitant>);
 
 impl Keep for () {
@@ -47,8 +65,8 @@ impl Keep for () {
         Ok(())
     }
 
-    fn restore(&self, nodes: usize, _: &mut Reader<'_>) -> Result<KeptLight<Self>, FlatError> {
-        Ok((vec![(); nodes], vec![(); nodes]))
+    fn restore(&self, _: usize, run: usize, _: &mut Reader<'_>) -> Result<KeptLight<Self>, FlatError> {
+        Ok((vec![(); run], vec![(); run]))
     }
 }
 
@@ -64,8 +82,23 @@ pub enum RestoreError {
     Flat(#[from] FlatError),
 }
 
+const LIGHT: &str = "extension's light";
+
+/// What there is of a solution beside its extension's light.
+struct Own {
+    scene: SceneData,
+    stats: Stats,
+    elements: Elements,
+    exitant: Exitant,
+    links: Links,
+    vertices: Vertices,
+    faces: FaceClusters,
+    faint: Vec<Rgb>,
+    unfinished: Unfinished,
+}
+
 impl<L: Keep> Solution<L> {
-    /// Writes all but the scene's geometry and materials.
+    /// Writes all but the scene's geometry and materials, and the extension's light.
     ///
     /// # Errors
     /// Those of what is written to.
@@ -81,38 +114,45 @@ impl<L: Keep> Solution<L> {
         self.vertices.store(out)?;
         out.put(&self.faint)?;
         self.unfinished.store(out)?;
-        self.field.store(&self.incident, &self.reflected, out)
+        self.field.store_own(out)
     }
 
-    /// Reads what [`store`](Self::store) wrote of a solution of the same scene. Of [`Stats::seconds`] there are those that
-    /// this took; the other statistics are those of the solve.
+    /// Writes the extension's light of the `run`-th of so many runs of nodes. All of them, in this order, are
+    /// what [`restore`](Self::restore) needs; that there are some lets it read them side by side.
+    ///
+    /// # Errors
+    /// Those of what is written to.
+    pub fn store_light(&self, run: usize, of: usize, out: &mut Writer<'_>) -> io::Result<()> {
+        let nodes = self.incident.len();
+        let [start, end] = [run, run + 1].map(|run| nodes.min(run * nodes.div_ceil(of)));
+        out.put(&[nodes, end - start].map(|count| count as u64))?;
+        self.field.store(&self.incident[start..end], &self.reflected[start..end], out)
+    }
+
+    /// Reads what [`store`](Self::store) and [`store_light`](Self::store_light) wrote of a solution of the same scene, where
+    /// there are threads side by side. Of [`Stats::seconds`] there are those that this took; the other statistics are those of
+    /// the solve.
     ///
     /// # Errors
     /// Where the scene cannot be used, or the arrays are not those of a solution of a scene like this.
-    pub fn restore(input: &SceneInput, field: L, from: &mut Reader<'_>) -> Result<Self, RestoreError> {
+    pub fn restore(
+        input: &SceneInput,
+        field: L,
+        own: &mut Reader<'_>,
+        light: &mut [Reader<'_>],
+    ) -> Result<Self, RestoreError> {
         let start = Instant::now();
-        const SPACE: &str = "unit space";
-        let normalization = Normalization::from_array(from.take_exactly(SPACE)?).ok_or(FlatError::Misfit(SPACE))?;
-        let scene = scene_by(input, normalization, |surfaces, _| {
-            let twins: Vec<u32> = from.take("coinciding surfaces")?;
-            let is_sound = |(surface, &twin): (usize, &u32)| twin as usize <= surface && twins[twin as usize] == twin;
-            let fit = twins.len() == surfaces.len() && twins.iter().enumerate().all(is_sound);
-            fits(fit, "coinciding surfaces")?;
-            Ok::<_, RestoreError>((Visibility::restore(surfaces, &twins, from)?, twins))
-        })?;
-        let mut stats = Stats::restore(from)?;
-        let elements = Elements::restore(&scene, from)?;
-        let count = elements.nodes.len();
-        let exitant = Exitant::restore(count, from)?;
-        let links = restore_links(count, from)?;
-        let vertices = Vertices::restore(&elements, from)?;
-        let faint: Vec<Rgb> = from.take_finite("faint materials")?;
-        fits(faint.len() == scene.materials.len(), "faint materials")?;
-        let unfinished = Unfinished::restore(count, from)?;
-        let (incident, reflected) = field.restore(count, from)?;
-        fits(incident.len() == count && reflected.len() == count, "extension's light")?;
+        let restore_light = || light.par_iter_mut().map(|from| restore_run(&field, from)).collect();
+        let (own, light): (_, Result<Vec<_>, _>) = join(|| Own::restore(input, &field, own), restore_light);
+        let Own { scene, mut stats, elements, exitant, links, vertices, faces, faint, unfinished } = own?;
+        let light = light?;
+        let nodes = elements.nodes.len();
+        fits(light.iter().all(|(all, _)| *all == nodes), LIGHT)?;
+        let (incident, reflected): (Vec<_>, Vec<_>) = light.into_iter().map(|(_, run)| run).unzip();
+        let incident: Vec<L::Incident> = incident.into_iter().flatten().collect();
+        let reflected: Vec<L::Exitant> = reflected.into_iter().flatten().collect();
+        fits(incident.len() == nodes && reflected.len() == nodes, LIGHT)?;
         stats.seconds.build = start.elapsed().as_secs_f64();
-        let faces = FaceClusters::new(&elements, &links).with_vertices(&elements, &vertices);
         Ok(Self {
             scene,
             elements,
@@ -127,6 +167,44 @@ impl<L: Keep> Solution<L> {
             stats,
             unfinished,
         })
+    }
+}
+
+/// The number of all nodes, and the light of a run of them.
+fn restore_run<L: Keep>(field: &L, from: &mut Reader<'_>) -> Result<(usize, KeptLight<L>), FlatError> {
+    let counts: [u64; 2] = from.take_exactly(LIGHT)?;
+    let [nodes, run] = counts.map(usize::try_from);
+    let [nodes, run] = [nodes, run].map(|count| count.map_err(|_| FlatError::Misfit(LIGHT)));
+    let (nodes, run) = (nodes?, run?);
+    fits(run <= nodes, LIGHT)?;
+    let light = field.restore(nodes, run, from)?;
+    fits(light.0.len() == run && light.1.len() == run, LIGHT)?;
+    Ok((nodes, light))
+}
+
+impl Own {
+    fn restore(input: &SceneInput, field: &impl Keep, from: &mut Reader<'_>) -> Result<Self, RestoreError> {
+        const SPACE: &str = "unit space";
+        let normalization = Normalization::from_array(from.take_exactly(SPACE)?).ok_or(FlatError::Misfit(SPACE))?;
+        let scene = scene_by(input, normalization, |surfaces, _| {
+            let twins: Vec<u32> = from.take("coinciding surfaces")?;
+            let is_sound = |(surface, &twin): (usize, &u32)| twin as usize <= surface && twins[twin as usize] == twin;
+            let fit = twins.len() == surfaces.len() && twins.iter().enumerate().all(is_sound);
+            fits(fit, "coinciding surfaces")?;
+            Ok::<_, RestoreError>((Visibility::restore(surfaces, &twins, from)?, twins))
+        })?;
+        let stats = Stats::restore(from)?;
+        let elements = Elements::restore(&scene, from)?;
+        let count = elements.nodes.len();
+        let exitant = Exitant::restore(count, from)?;
+        let links = restore_links(count, from)?;
+        let vertices = Vertices::restore(&elements, from)?;
+        let faint: Vec<Rgb> = from.take_finite("faint materials")?;
+        fits(faint.len() == scene.materials.len(), "faint materials")?;
+        let unfinished = Unfinished::restore(count, from)?;
+        field.restore_own(from)?;
+        let faces = FaceClusters::new(&elements, &links).with_vertices(&elements, &vertices);
+        Ok(Self { scene, stats, elements, exitant, links, vertices, faces, faint, unfinished })
     }
 }
 

@@ -2,13 +2,19 @@
 //! library under the same names. For extensions, too.
 
 #[cfg(feature = "parallel")]
-pub use rayon::{current_num_threads, prelude};
+pub use rayon::{current_num_threads, join, prelude};
 
 /// Threads that work: one.
 #[cfg(not(feature = "parallel"))]
 #[must_use]
 pub fn current_num_threads() -> usize {
     1
+}
+
+/// Does one thing and then the other.
+#[cfg(not(feature = "parallel"))]
+pub fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
+    (a(), b())
 }
 
 /// What stands in for rayon's traits.

@@ -1,30 +1,31 @@
 //! Solution files: what `--save` keeps and `--load` looks at again.
 //!
-//! A head of 40 bytes, then the arrays of [`Solution::store`](hr_diffuse::Solution::store), all of it little-endian. The
-//! head tells what file it is, of which version, how long, of which scene, and has a checksum of everything else, so that no
-//! byte can be missing or wrong unnoticed. Geometry and materials are not in the file: they come from the scene, whose
-//! [fingerprint](hr_scene::Scene::fingerprint) must be the one in the head.
+//! A head of 48 bytes, a table, and parts, all of it little-endian. The head tells what file it is, of which version, how long,
+//! of which scene, and how many parts it has; the table how long each of these is, and its checksum; the head has one of
+//! itself and the table, so that no byte can be missing or wrong unnoticed. The parts are the arrays of
+//! [`Solution::store`](hr_diffuse::Solution::store) and, in runs that threads read side by side, of
+//! [`Solution::store_light`](hr_diffuse::Solution::store_light). Geometry and materials are not in the file: they come from the
+//! scene, whose [fingerprint](hr_scene::Scene::fingerprint) must be the one in the head.
 
 use crate::solved::{Accuracy, Solved};
 use glossy_ext::GlossyField;
 use glossy_ext::haar::Refinement;
 use hr_diffuse::Solution;
-use hr_diffuse::flat::{Reader, Writer};
+use hr_diffuse::flat::{FlatError, Reader, Writer};
 use hr_diffuse::keep::RestoreError;
 use hr_scene::whole_file::{open, write_whole};
 use hr_scene::{Scene, SceneError};
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Read, Seek, SeekFrom, Take, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use xxhash_rust::xxh3::Xxh3;
 
 /// What the file begins with. Written in the machine's byte order: on a big-endian machine files of others are unknown.
 const MAGIC: u64 = u64::from_le_bytes(*b"hr-light");
 
 /// Counts up with every change of what the arrays are or mean.
-const VERSION: u64 = 11;
+const VERSION: u64 = 12;
 
 /// Why a solution cannot be loaded.
 #[derive(Debug, thiserror::Error)]
@@ -91,21 +92,36 @@ struct Head {
     length: u64,
     /// Fingerprint of the scene.
     scene: u64,
-    /// XXH3, 64 bits, of what follows and then of the head up to here.
+    parts: u64,
+    /// XXH3, 64 bits, of the head up to here and of the table.
     checksum: u64,
 }
 
-/// Files are read in pieces of so many bytes, which the processor's caches hold, and so many of them ahead.
-const PIECE: usize = 1 << 17;
-const AHEAD: usize = 4;
-
 impl Head {
-    /// The checksum, that of what follows the head being known.
-    fn sealed(self, mut body: Xxh3) -> Self {
-        body.update(bytemuck::bytes_of(&[self.magic, self.version, self.length, self.scene]));
-        Self { checksum: body.digest(), ..self }
+    /// With the checksum.
+    fn sealed(self, table: &[Part]) -> Self {
+        let mut sum = Xxh3::new();
+        sum.update(bytemuck::bytes_of(&[self.magic, self.version, self.length, self.scene, self.parts]));
+        sum.update(bytemuck::cast_slice(table));
+        Self { checksum: sum.digest(), ..self }
     }
 }
+
+/// What the table says of a part.
+#[derive(Clone, Copy, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Part {
+    /// In bytes.
+    length: u64,
+    /// XXH3, 64 bits.
+    checksum: u64,
+}
+
+/// The extension's light is kept in so many runs.
+const RUNS: usize = 16;
+
+/// No file has more parts.
+const MOST_PARTS: u64 = 1 << 10;
 
 /// Length and checksum of what is written to it.
 #[derive(Default)]
@@ -131,18 +147,31 @@ impl Write for Measure {
 /// # Errors
 /// Where the file cannot be written.
 pub fn save(path: &Path, solved: &Solved, accuracy: Accuracy) -> Result<(), SceneError> {
-    let store = |out: &mut dyn Write| {
+    let solution = &solved.solution;
+    let store = |part: usize, out: &mut dyn Write| {
         let mut out = Writer::new(out);
-        out.put(&[accuracy])?;
-        solved.solution.store(&mut out)
+        match part.checked_sub(1) {
+            None => {
+                out.put(&[accuracy])?;
+                solution.store(&mut out)
+            }
+            Some(run) => solution.store_light(run, RUNS, &mut out),
+        }
     };
     write_whole(path, |out| {
-        let mut measure = Measure::default();
-        store(&mut measure)?;
-        let length = size_of::<Head>() as u64 + measure.length;
-        let head = Head { magic: MAGIC, version: VERSION, length, scene: solved.scene.fingerprint(), checksum: 0 };
-        out.write_all(bytemuck::bytes_of(&head.sealed(measure.sum)))?;
-        store(out)
+        let table = (0..=RUNS).map(|part| {
+            let mut measure = Measure::default();
+            store(part, &mut measure)?;
+            Ok(Part { length: measure.length, checksum: measure.sum.digest() })
+        });
+        let table = table.collect::<io::Result<Vec<Part>>>()?;
+        let before = size_of::<Head>() + size_of_val(table.as_slice());
+        let length = before as u64 + table.iter().map(|part| part.length).sum::<u64>();
+        let (scene, parts) = (solved.scene.fingerprint(), table.len() as u64);
+        let head = Head { magic: MAGIC, version: VERSION, length, scene, parts, checksum: 0 };
+        out.write_all(bytemuck::bytes_of(&head.sealed(&table)))?;
+        out.write_all(bytemuck::cast_slice(&table))?;
+        (0..=RUNS).try_for_each(|part| store(part, out))
     })
 }
 
@@ -171,75 +200,87 @@ pub fn load(path: &Path, scene: Arc<Scene>) -> Result<(Solved, Accuracy), Soluti
     if head.length != found {
         return Err(SolutionError::Length { path: at(), found, expected: head.length });
     }
-    let (pieces, ahead) = sync_channel(AHEAD);
-    let (used, again) = channel();
-    // What is damaged can be read as safely as what is forged: while one thread reads and sums, another restores.
-    let (restored, sum, is_its_own) = std::thread::scope(|scope| {
-        let reading = scope.spawn(move || read_ahead(file, &pieces, &again));
-        let owned = scope.spawn(|| head.scene == scene.fingerprint());
-        let mut body = Ahead { pieces: ahead, used, piece: Vec::new(), at: 0 };
-        let restored = restore(&scene, &mut Reader::new(&mut body, found - size_of::<Head>() as u64));
-        drop(body);
-        let failed = || io::Error::other("a thread that read it failed");
-        let sum = reading.join().unwrap_or_else(|_| Err(failed()));
-        (restored, sum, owned.join().unwrap_or(false))
+    let damaged = || SolutionError::Checksum { path: at() };
+    let table = read_table(&mut file, head).map_err(broken)?.ok_or_else(damaged)?;
+    let mut start = (size_of::<Head>() + size_of_val(table.as_slice())) as u64;
+    let parts = table.iter().map(|part| {
+        let summed = Summed::new(path, start, part.length);
+        start += part.length;
+        summed
     });
-    if head.sealed(sum.map_err(broken)?).checksum != head.checksum {
-        return Err(SolutionError::Checksum { path: at() });
+    let mut parts = parts.collect::<Result<Vec<_>, SceneError>>()?;
+    // What is damaged can be read as safely as what is forged: the sums are known at the end.
+    let restored = restore(&scene, &mut parts);
+    for (part, found) in table.iter().zip(parts) {
+        if found.finish().map_err(broken)? != *part {
+            return Err(damaged());
+        }
     }
-    if !is_its_own {
+    if head.scene != scene.fingerprint() {
         return Err(SolutionError::OtherScene { path: at(), scene: scene.name.clone() });
     }
     let (solution, accuracy) = restored.map_err(|source| SolutionError::Content { path: at(), source })?;
     Ok((Solved { scene, solution }, accuracy))
 }
 
-/// Hands on a file in pieces, as long as somebody takes them, and sums all of it.
-fn read_ahead(mut file: File, pieces: &SyncSender<Vec<u8>>, again: &Receiver<Vec<u8>>) -> io::Result<Xxh3> {
-    let mut sum = Xxh3::new();
-    loop {
-        let mut piece = again.try_recv().unwrap_or_default();
-        piece.resize(PIECE, 0);
-        let length = match file.read(&mut piece) {
-            Ok(0) => return Ok(sum),
-            Ok(length) => length,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-            Err(error) => return Err(error),
-        };
-        piece.truncate(length);
-        sum.update(&piece);
-        // Where nobody wants more of it, the sum is still to be known.
-        drop(pieces.send(piece));
+/// The table of parts, or nothing where it, or the head, is not what was written.
+fn read_table(file: &mut File, head: Head) -> io::Result<Option<Vec<Part>>> {
+    let mut table = vec![Part { length: 0, checksum: 0 }; head.parts.clamp(1, MOST_PARTS) as usize];
+    let bytes = bytemuck::cast_slice_mut(&mut table);
+    match file.read_exact(bytes) {
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
+        read => read?,
+    }
+    let before = (size_of::<Head>() + bytes.len()) as u64;
+    let length = table.iter().try_fold(before, |sum, part| sum.checked_add(part.length));
+    let are_right = head.sealed(&table).checksum == head.checksum && length == Some(head.length);
+    Ok((are_right && head.parts == table.len() as u64).then_some(table))
+}
+
+/// Part of a file, summed while it is read.
+struct Summed {
+    from: Take<File>,
+    length: u64,
+    sum: Xxh3,
+}
+
+impl Summed {
+    /// So many bytes of a file.
+    fn new(path: &Path, start: u64, length: u64) -> Result<Self, SceneError> {
+        let (mut file, _) = open(path)?;
+        let place = file.seek(SeekFrom::Start(start));
+        place.map_err(|source| SceneError::Io { path: path.to_path_buf(), source })?;
+        Ok(Self { from: file.take(length), length, sum: Xxh3::new() })
+    }
+
+    /// What there is of it, read before or not.
+    fn finish(mut self) -> io::Result<Part> {
+        io::copy(&mut self, &mut io::sink())?;
+        Ok(Part { length: self.length - self.from.limit(), checksum: self.sum.digest() })
     }
 }
 
-/// Reads what another thread has read.
-struct Ahead {
-    pieces: Receiver<Vec<u8>>,
-    used: Sender<Vec<u8>>,
-    piece: Vec<u8>,
-    at: usize,
-}
-
-impl Read for Ahead {
+impl Read for Summed {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        if self.at == self.piece.len() {
-            // None come any more: this is the end.
-            let Ok(next) = self.pieces.recv() else { return Ok(0) };
-            drop(self.used.send(std::mem::replace(&mut self.piece, next)));
-            self.at = 0;
-        }
-        let length = (&self.piece[self.at..]).read(out)?;
-        self.at += length;
+        let length = self.from.read(out)?;
+        self.sum.update(&out[..length]);
         Ok(length)
     }
 }
 
-fn restore(scene: &Arc<Scene>, from: &mut Reader<'_>) -> Result<(Solution<GlossyField>, Accuracy), RestoreError> {
-    let [accuracy] = from.take_exactly("accuracy")?;
+fn restore(scene: &Arc<Scene>, parts: &mut [Summed]) -> Result<(Solution<GlossyField>, Accuracy), RestoreError> {
+    let mut parts: Vec<Reader<'_>> = parts
+        .iter_mut()
+        .map(|part| {
+            let length = part.length;
+            Reader::new(part, length)
+        })
+        .collect();
+    let (own, light) = parts.split_first_mut().ok_or(FlatError::Ends("parts"))?;
+    let [accuracy] = own.take_exactly("accuracy")?;
     let field = GlossyField::new(&scene.reflectors(), Refinement::default());
-    let solution = Solution::restore(&scene.input(), field, from)?;
-    from.end()?;
+    let solution = Solution::restore(&scene.input(), field, own, light)?;
+    parts.iter().try_for_each(Reader::end)?;
     Ok((solution, accuracy))
 }
 

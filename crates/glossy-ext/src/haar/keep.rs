@@ -3,7 +3,6 @@
 use super::{Haar, MAX_LEVEL, Node};
 use crate::basis::half::Half3;
 use hr_diffuse::flat::{FlatError, Reader, Writer, fits};
-use hr_diffuse::threads::prelude::*;
 use std::io;
 
 const WHAT: &str = "directional distributions";
@@ -46,8 +45,7 @@ impl Haar {
         let heads: Vec<Head> = from.take(WHAT)?;
         let vertices: Vec<Vec<Half3>> = from.take_groups(heads.iter().map(|head| head.vertices), WHAT)?;
         let nodes: Vec<Vec<Node>> = from.take_groups(heads.iter().map(|head| head.nodes), WHAT)?;
-        let parts: Vec<_> = heads.into_iter().zip(vertices).zip(nodes).collect();
-        let restored = parts.into_par_iter().with_min_len(64).map(|((head, vertices), nodes)| {
+        let restored = heads.into_iter().zip(vertices).zip(nodes).map(|((head, vertices), nodes)| {
             let roots = head.roots.try_into().map_err(|_| FlatError::Misfit(WHAT))?;
             let haar = Self { scale: head.scale, roots, vertices: vertices.into(), nodes: nodes.into() };
             fits(haar.is_sound(), WHAT).map(|()| haar)
@@ -67,17 +65,21 @@ impl Haar {
             return false;
         }
         let vertices = self.vertices.len() as u16;
-        // Where the next node's children begin, and where the level ends.
-        let (mut next, mut level, mut end) = (roots, 0, roots);
-        let are_sound = self.nodes.iter().enumerate().all(|(index, node)| {
-            if index == end {
-                (level, end) = (level + 1, next);
+        // Where the next node's children begin. Nothing ends within a level, which is faster than to look whether it should.
+        let (mut next, mut are_sound) = (roots, true);
+        let (mut level, mut range) = (0, 0..roots);
+        while !range.is_empty() {
+            if level > MAX_LEVEL || range.end > self.nodes.len() {
+                return false;
             }
-            let follow = node.is_childless() || node.is_divided() && node.base() == next;
-            next += node.children();
-            let are_vertices = node.mids().into_iter().all(|m| m == Node::NO_VERTEX || m < vertices);
-            index < end && level <= MAX_LEVEL && are_vertices && follow
-        });
+            for node in &self.nodes[range.clone()] {
+                are_sound &= node.is_childless() | (node.is_divided() & (node.base() == next));
+                // What is no vertex is made 0.
+                are_sound &= node.mids().iter().fold(true, |all, m| all & ((m + 1) & Node::NO_VERTEX <= vertices));
+                next += node.children();
+            }
+            (level, range) = (level + 1, range.end..next);
+        }
         are_sound && next == self.nodes.len()
     }
 }

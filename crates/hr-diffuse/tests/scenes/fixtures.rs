@@ -75,15 +75,23 @@ pub(crate) fn apart(a: &[Rgb], b: &[Rgb]) -> f32 {
     a.iter().zip(b).map(|(a, b)| ((*a - *b).abs() / b.max(Rgb::splat(1e-6))).max_element()).fold(0.0, f32::max)
 }
 
-/// A solution as it is kept.
-pub(crate) fn stored(solution: &Solution) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    solution.store(&mut Writer::new(&mut bytes)).expect("memory takes everything");
-    bytes
+/// A solution as it is kept: the solver's part and the extension's, in two runs.
+pub(crate) fn stored(solution: &Solution) -> [Vec<u8>; 3] {
+    let mut parts = [Vec::new(), Vec::new(), Vec::new()];
+    let [own, light @ ..] = &mut parts;
+    solution.store(&mut Writer::new(own)).expect("memory takes everything");
+    for (run, light) in light.iter_mut().enumerate() {
+        solution.store_light(run, 2, &mut Writer::new(light)).expect("memory takes everything");
+    }
+    parts
 }
 
 /// A solution that was kept.
-pub(crate) fn restored(input: &SceneInput, bytes: &[u8]) -> Solution {
-    let mut from = bytes;
-    Solution::restore(input, (), &mut Reader::new(&mut from, bytes.len() as u64)).expect("what was written")
+pub(crate) fn restored(input: &SceneInput, parts: &[Vec<u8>; 3]) -> Solution {
+    let mut parts = parts.each_ref().map(Vec::as_slice);
+    let [mut own, mut light @ ..] = parts.each_mut().map(|part| {
+        let length = part.len() as u64;
+        Reader::new(part, length)
+    });
+    Solution::restore(input, (), &mut own, &mut light).expect("what was written")
 }

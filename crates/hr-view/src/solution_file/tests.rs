@@ -2,8 +2,8 @@ use super::*;
 use crate::glossy::Mode;
 use crate::raycast::RayCaster;
 use hr_diffuse::Settings;
-use hr_diffuse::flat::FlatError;
 use std::ops::ControlFlow;
+use xxhash_rust::xxh3::xxh3_64;
 
 /// A file of a test's own, removed at the end.
 struct Kept(PathBuf);
@@ -28,6 +28,9 @@ impl Drop for Kept {
     }
 }
 
+/// Where the parts begin.
+const BODY: usize = size_of::<Head>() + (1 + RUNS) * size_of::<Part>();
+
 const ACCURACY: Accuracy = Accuracy { asked: 0.9, believed: 0.8 };
 
 fn scene(name: &str) -> Arc<Scene> {
@@ -50,14 +53,23 @@ fn error(kept: &Kept, scene: &Arc<Scene>) -> SolutionError {
     load(&kept.0, Arc::clone(scene)).expect_err("it is refused")
 }
 
-/// Puts the right length and checksum on what was changed.
+/// Puts the right lengths and checksums on what was changed: what is missing is missing from the last parts.
 fn seal(bytes: &mut [u8]) {
     let length = bytes.len() as u64;
-    let (head, body) = bytes.split_at_mut(size_of::<Head>());
-    let mut sum = Xxh3::new();
-    sum.update(body);
-    let unsealed = Head { length, ..bytemuck::pod_read_unaligned(head) };
-    head.copy_from_slice(bytemuck::bytes_of(&unsealed.sealed(sum)));
+    let (head, rest) = bytes.split_at_mut(size_of::<Head>());
+    let unsealed: Head = bytemuck::pod_read_unaligned(head);
+    let (table, mut body) = rest.split_at_mut(unsealed.parts as usize * size_of::<Part>());
+    let mut sealed: Vec<Part> = bytemuck::pod_collect_to_vec(table);
+    for (i, part) in sealed.iter_mut().enumerate() {
+        let is_last = i as u64 + 1 == unsealed.parts;
+        let there = body.len() as u64;
+        part.length = if is_last { there } else { part.length.min(there) };
+        let (this, after) = body.split_at_mut(part.length as usize);
+        part.checksum = xxh3_64(this);
+        body = after;
+    }
+    table.copy_from_slice(bytemuck::cast_slice(&sealed));
+    head.copy_from_slice(bytemuck::bytes_of(&Head { length, ..unsealed }.sealed(&sealed)));
 }
 
 #[test]
@@ -156,14 +168,14 @@ fn forged_files_do_no_harm() {
         let mut bytes = whole.clone();
         match round % 3 {
             0 => {
-                let at = size_of::<Head>() + random(whole.len() - size_of::<Head>());
+                let at = BODY + random(whole.len() - BODY);
                 bytes[at] ^= 1 << random(8);
             }
             1 => {
-                let at = size_of::<Head>() + 4 * random((whole.len() - size_of::<Head>()) / 4);
+                let at = BODY + 4 * random((whole.len() - BODY) / 4);
                 bytes[at..at + 4].fill(0xff);
             }
-            _ => bytes.truncate(size_of::<Head>() + 8 * random((whole.len() - size_of::<Head>()) / 8)),
+            _ => bytes.truncate(BODY + 8 * random((whole.len() - BODY) / 8)),
         }
         seal(&mut bytes);
         file.write(&bytes);
