@@ -13,8 +13,8 @@
 //!   whose direction has changed most; the others follow as soon as it rests.
 //!
 //! Pictures of the page and of the ray caster differ by 0.2 to 0.4 % on average outside silhouettes; the browser test
-//! keeps that below 1.5 %. A soda shop of 1,727 surfaces at the default error takes 6.8 MB; in Chromium with its
-//! software rasteriser on two cores it is there in 1.2 s and shows 29 frames a second at 1280 × 720.
+//! keeps that below 1.5 %. A soda shop of 1,727 surfaces at the default error takes 4.4 MB; in Chromium with its
+//! software rasteriser on two cores it is there in 1.2 to 1.5 s and shows 21 to 29 frames a second at 1280 × 720.
 //!
 //! # Layout
 //! After the viewer comes one script element with base64 text of a gzip file (whose checksum tells a damaged page from a

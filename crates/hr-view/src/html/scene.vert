@@ -6,6 +6,9 @@ uniform vec3 eye;      // relative to the mesh's origin
 uniform vec4 right;    // unit; w: horizontal scale, cotangent of half the field of view
 uniform vec4 up;       // unit; w: vertical scale
 uniform vec4 forward;  // unit; w: distance of the near plane
+uniform float exposure;
+uniform float brightest; // largest exposed value
+uniform mat3 toSrgb;   // from the scene's primaries
 
 in vec3 place;
 in uint irradiance;
@@ -14,10 +17,14 @@ in uint emission;
 in vec2 uv;
 in vec3 glossy;
 
-out vec3 irradianceHere;
-out vec3 tintHere;
-out vec3 radianceHere;
+#ifdef TEXTURED
+out vec3 diffuseHere;  // that the texture multiplies
+out vec3 otherHere;
 out vec2 uvHere;
+#else
+// What of tone mapping is linear: the same before interpolation and after it.
+out vec3 exposedHere;
+#endif
 
 // Three channels of nine bits over a common exponent.
 vec3 color(uint word) {
@@ -29,8 +36,13 @@ void main() {
   float depth = dot(to, forward.xyz);
   // No far plane: −1 at the near plane, toward 1 far away.
   gl_Position = vec4(dot(to, right.xyz) * right.w, dot(to, up.xyz) * up.w, depth - 2.0 * forward.w, depth);
-  irradianceHere = color(irradiance);
-  tintHere = color(tint);
-  radianceHere = color(emission) + glossy;
+  vec3 diffuse = color(irradiance) * color(tint);
+  vec3 other = color(emission) + glossy;
+#ifdef TEXTURED
+  diffuseHere = diffuse;
+  otherHere = other;
   uvHere = uv;
+#else
+  exposedHere = toSrgb * clamp((diffuse + other) * exposure, 0.0, brightest);
+#endif
 }
