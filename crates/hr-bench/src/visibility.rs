@@ -193,8 +193,9 @@ pub fn report(
         }
     }
     let eye = Normalization::new(&scene.surfaces).to_unit(camera.eye.into());
+    let rays = camera.rays();
     let pixels = (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| (f64::from(x), f64::from(y))));
-    let directions: Vec<Vec3> = pixels.map(|(x, y)| camera.direction(x + 0.5, y + 0.5).as_vec3()).collect();
+    let directions: Vec<Vec3> = pixels.map(|(x, y)| rays.direction(x + 0.5, y + 0.5).as_vec3()).collect();
     let start = Instant::now();
     let hits = directions.iter().filter(|&&d| visibility.closest(eye, d, 0.0, f32::MAX).is_some()).count();
     let seconds = start.elapsed().as_secs_f64();

@@ -1,7 +1,7 @@
 //! Pinhole cameras: their JSON form, and what makes one usable.
 
 use crate::SceneError;
-use glam::DVec3;
+use glam::{DVec3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -101,15 +101,45 @@ impl Camera {
         (right, right.cross(forward), forward)
     }
 
+    /// Unit direction through the image point (x, y) in pixels from the upper left corner. Of many of them
+    /// [`rays`](Self::rays) costs less.
+    #[must_use]
+    pub fn direction(&self, x: f64, y: f64) -> DVec3 {
+        self.rays().direction(x, y)
+    }
+
+    /// The rays of its picture.
+    #[must_use]
+    pub fn rays(&self) -> Rays {
+        let (right, up, forward) = self.frame();
+        let (width, height) = (f64::from(self.width), f64::from(self.height));
+        let pixel = 2.0 * (0.5 * self.fov_x.to_radians()).tan() / width;
+        let corner = forward + (up * height - right * width) * (0.5 * pixel);
+        Rays { corner, right: right * pixel, down: -up * pixel }
+    }
+}
+
+/// The rays of a camera's picture: what all of its directions have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Rays {
+    /// Toward the upper left corner of the picture at distance 1.
+    corner: DVec3,
+    /// To the next pixel.
+    right: DVec3,
+    down: DVec3,
+}
+
+impl Rays {
     /// Unit direction through the image point (x, y) in pixels from the upper left corner.
     #[must_use]
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
-        let (right, up, forward) = self.frame();
-        let half = (self.fov_x.to_radians() * 0.5).tan();
-        let scale = 2.0 * half / f64::from(self.width);
-        let sx = (x - 0.5 * f64::from(self.width)) * scale;
-        let sy = (0.5 * f64::from(self.height) - y) * scale;
-        (forward + right * sx + up * sy).normalize()
+        (self.corner + self.right * x + self.down * y).normalize()
+    }
+
+    /// The same through a place (0…1) within a pixel.
+    #[must_use]
+    pub fn within(&self, x: usize, y: usize, place: Vec2) -> Vec3 {
+        self.direction(x as f64 + f64::from(place.x), y as f64 + f64::from(place.y)).as_vec3()
     }
 }
 

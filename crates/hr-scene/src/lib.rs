@@ -24,7 +24,7 @@ mod viewpoint;
 mod warnings;
 pub mod whole_file;
 
-pub use camera::Camera;
+pub use camera::{Camera, Rays};
 pub use error::SceneError;
 pub use film::{Film, Pixel};
 pub use glossy_ext::Rgb;

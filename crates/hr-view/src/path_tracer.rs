@@ -222,7 +222,7 @@ impl<'a> PathTracer<'a> {
         let mut sigma = image.clone();
         let width = camera.width as usize;
         let eye = self.normalization.to_unit(camera.eye.into());
-        let view = View::new(camera);
+        let rays = camera.rays();
         let done = AtomicU32::new(0);
         let rows = image.pixels.par_chunks_mut(width).zip(sigma.pixels.par_chunks_mut(width));
         let edges = rows.enumerate().flat_map_iter(|(y, (row, sigmas))| {
@@ -232,7 +232,7 @@ impl<'a> PathTracer<'a> {
                 let (mut pixel, mut squares) = (Pixel::default(), DVec3::ZERO);
                 for index in 0..paths {
                     let sampler = Sampler::new(seed, index);
-                    let direction = view.direction(Vec2::new(x as f32, y as f32), sampler.pair(0));
+                    let direction = rays.within(x, y, sampler.pair(0));
                     let (surface, radiance) = self.seen(eye, direction, &sampler, known);
                     pixel.add(surface, radiance);
                     squares += radiance.as_dvec3() * radiance.as_dvec3();
@@ -258,12 +258,12 @@ impl<'a> PathTracer<'a> {
     pub fn emission(&self, camera: &Camera) -> Image {
         let mut image = Image::new(camera.width, camera.height);
         let eye = self.normalization.to_unit(camera.eye.into());
-        let view = View::new(camera);
+        let rays = camera.rays();
         image.pixels.par_chunks_mut(camera.width as usize).enumerate().for_each(|(y, row)| {
             for (x, pixel) in row.iter_mut().enumerate() {
                 for i in 0..LOOKS * LOOKS {
                     let within = Vec2::new((i % LOOKS) as f32 + 0.5, (i / LOOKS) as f32 + 0.5) / LOOKS as f32;
-                    let direction = view.direction(Vec2::new(x as f32, y as f32), within);
+                    let direction = rays.within(x, y, within);
                     if let Some(hit) = self.visibility.closest(eye, direction, START, f32::MAX) {
                         *pixel += self.emitted(&hit) / (LOOKS * LOOKS) as f32;
                     }
@@ -544,30 +544,4 @@ pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
     let (sin, cos) = (2.0 * PI * u.x).sin_cos();
     let radius = u.y.sqrt();
     Vec3::new(radius * cos, radius * sin, (1.0 - u.y).sqrt())
-}
-
-/// A camera, ready to give many directions.
-struct View {
-    corner: DVec3,
-    right: DVec3,
-    down: DVec3,
-}
-
-impl View {
-    fn new(camera: &Camera) -> Self {
-        let (right, up, forward) = camera.frame();
-        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-        let pixel = 2.0 * (0.5 * camera.fov_x.to_radians()).tan() / width;
-        Self {
-            corner: forward + (up * height - right * width) * (0.5 * pixel),
-            right: right * pixel,
-            down: -up * pixel,
-        }
-    }
-
-    /// Unit direction through a place within a pixel.
-    fn direction(&self, pixel: Vec2, within: Vec2) -> Vec3 {
-        let at = pixel.as_dvec2() + within.as_dvec2();
-        (self.corner + self.right * at.x + self.down * at.y).normalize().as_vec3()
-    }
 }

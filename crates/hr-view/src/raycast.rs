@@ -12,7 +12,7 @@ use glossy_ext::{Basis, GlossyField, Incident, Lobe, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2};
 use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
-use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
+use hr_scene::{Camera, Film, Image, Material, Pixel, Rays, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -167,10 +167,12 @@ impl<'a, B: Basis> RayCaster<'a, B> {
 
     /// To be printed or not: rays that are more than others have do not enter the image.
     fn expose(&self, camera: &Camera, printed: bool, watch: &(dyn Fn(f32) + Sync)) -> Film {
-        let rays = self.grid * self.grid;
         if self.mode == Mode::Gather {
-            return self.tracer.render_until(self, camera, (rays * GATHERED).next_power_of_two(), 0, watch).0;
+            let paths = (self.grid * self.grid * GATHERED).next_power_of_two();
+            return self.tracer.render_until(self, camera, paths, 0, watch).0;
         }
+        let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
+        let rays = camera.rays();
         let mut image = Image::new(camera.width, camera.height);
         let (width, height) = (camera.width as usize, camera.height as usize);
         let mut wanted = vec![Wanted::default(); image.pixels.len()];
@@ -184,7 +186,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         rows.enumerate().for_each(|(y, (row, wanted))| {
             let mut shared = Shared::default();
             for (x, (mean, wanted)) in row.iter_mut().zip(wanted).enumerate() {
-                let pixel = self.pixel(camera, x, y, 0, &mut shared);
+                let pixel = self.pixel((eye, &rays), x, y, 0, &mut shared);
                 (*mean, *wanted) = (pixel.radiance(), Wanted::by(&pixel));
             }
             tell();
@@ -203,7 +205,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
                 if x + 1 == width {
                     tell();
                 }
-                (rounds > 0).then(|| (y * width + x, self.pixel(camera, x, y, u32::from(rounds), &mut shared)))
+                (rounds > 0).then(|| (y * width + x, self.pixel((eye, &rays), x, y, u32::from(rounds), &mut shared)))
             };
             (0..width).filter_map(row)
         });
@@ -212,22 +214,20 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     }
 
     /// What is seen in a pixel with some rounds of rays more than all have.
-    fn pixel(&self, camera: &Camera, x: usize, y: usize, rounds: u32, shared: &mut Shared) -> Pixel {
-        let eye = self.solution.scene.normalization.to_unit(DVec3::from(camera.eye));
-        let (rays, seed) = (self.grid * self.grid, hash(x as u32, y as u32 ^ 0x6b43));
+    fn pixel(&self, (eye, rays): (Vec3, &Rays), x: usize, y: usize, rounds: u32, shared: &mut Shared) -> Pixel {
+        let (all, seed) = (self.grid * self.grid, hash(x as u32, y as u32 ^ 0x6b43));
         let mut pixel = Pixel::default();
-        shared.ray = (eye, camera.direction(x as f64 + 0.5, y as f64 + 0.5).as_vec3());
+        shared.ray = (eye, rays.within(x, y, Vec2::splat(0.5)));
         shared.middle = None;
-        for i in 0..rays * (1 + rounds) {
+        for i in 0..all * (1 + rounds) {
             let sampler = Sampler::new(seed, i);
-            let within = if i < rays {
+            let within = if i < all {
                 let cell = Vec2::new((i % self.grid) as f32, (i / self.grid) as f32);
                 (cell + point2(seed, i)) / self.grid as f32
             } else {
                 sampler.pair(0)
             };
-            let (px, py) = (x as f64 + f64::from(within.x), y as f64 + f64::from(within.y));
-            let direction = camera.direction(px, py).as_vec3();
+            let direction = rays.within(x, y, within);
             let (surface, light) = self.seen(eye, direction, u32::MAX, 0, &sampler, shared);
             pixel.add(surface, light);
         }

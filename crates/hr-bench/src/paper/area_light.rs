@@ -93,12 +93,12 @@ impl Subject {
     /// The glossy light of the plate.
     fn image(&self, reflector: &Ward, n: usize, kind: Kind) -> Image {
         let mut image = Image::new(self.camera.width, self.camera.height);
-        let eye = DVec3::from(self.camera.eye);
+        let (eye, rays) = (DVec3::from(self.camera.eye), self.camera.rays());
         let width = self.camera.width as usize;
         let [x0, y0, x1, y1] = self.plate;
         image.pixels.par_iter_mut().enumerate().for_each_init(Vec::new, |samples, (i, pixel)| {
             let (x, y) = (i % width, i / width);
-            let direction = self.camera.direction(x as f64 + 0.5, y as f64 + 0.5);
+            let direction = rays.direction(x as f64 + 0.5, y as f64 + 0.5);
             let at = eye - direction * (eye.z / direction.z);
             if direction.z < 0.0 && (x0..x1).contains(&at.x) && (y0..y1).contains(&at.y) {
                 self.samples(at, n, kind, samples);

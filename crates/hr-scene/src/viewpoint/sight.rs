@@ -97,12 +97,12 @@ impl<'a> Sight<'a> {
     /// How much of a picture shows what is lit, and not too near: 0…1.
     pub(super) fn seen(&self, camera: &Camera) -> f64 {
         let [across, down] = GRID;
-        let (eye, mut sum) = (DVec3::from(camera.eye), 0.0);
+        let (eye, rays, mut sum) = (DVec3::from(camera.eye), camera.rays(), 0.0);
         let near = NEAR * (DVec3::from(camera.target) - eye).length() * self.normalization.scale();
         for k in 0..across * down {
             let x = (f64::from(k % across) + 0.5) * f64::from(camera.width) / f64::from(across);
             let y = (f64::from(k / across) + 0.5) * f64::from(camera.height) / f64::from(down);
-            let direction = camera.direction(x, y);
+            let direction = rays.direction(x, y);
             let Some(hit) = self.hit(eye, direction).filter(|hit| self.shows(hit)) else { continue };
             let worth = if hit.front && self.exitance(&hit) != Rgb::ZERO {
                 LAMP
