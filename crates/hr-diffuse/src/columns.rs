@@ -15,6 +15,9 @@ use crate::transport::Light;
 pub(crate) const FREELY: f32 = 1.4;
 /// With this, light dies out in any scene.
 pub(crate) const STRICTLY: f32 = 0.9;
+/// Where light went on growing, it is also no more than this times what an extension's mean albedo makes of what arrives: from some
+/// directions more is reflected than from others.
+const MOST_GAIN: f32 = 1.15;
 
 /// By node: the factor, at most 1, for the directional light of all its links, which was made of this irradiance of leaves. `directional` is
 /// the light that each asks for, `lit` the area that each link lights, times what lets its light through; `most`, by leaf, what its links may carry.
@@ -34,8 +37,10 @@ pub(crate) fn gains<L: LightField>(
     let mut power = vec![0.0_f32; nodes.len()];
     for (node, element) in nodes.iter().enumerate().rev() {
         if element.active && element.is_patch() && element.child_count == 0 {
-            let glossy = irradiance[node] * (Rgb::ONE - element.reflectance);
-            power[node] = most[node] * glossy.element_sum() * element.area;
+            let rest = Rgb::ONE - element.reflectance;
+            let albedo = light.field.active(element.material).unwrap_or(Rgb::ZERO);
+            let glossy = if most[node] < FREELY { rest.min(MOST_GAIN * albedo) } else { rest };
+            power[node] = most[node] * (irradiance[node] * glossy).element_sum() * element.area;
         }
         if node > 0 {
             power[element.parent as usize] += power[node];
@@ -52,4 +57,67 @@ pub(crate) fn gains<L: LightField>(
         share[parent] = share[parent].max(share[node]);
     }
     share.into_iter().map(|share| share.max(1.0).recip()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hooks::{Arrived, Hierarchy, NodeId, Transfer};
+    use crate::{Cone, DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::{DVec3, Vec3};
+
+    const DIFFUSE: f32 = 0.7;
+    const GLOSSY: f32 = 0.1;
+
+    /// Reflects little beside the diffuse part.
+    struct Gloss;
+
+    impl LightField for Gloss {
+        type Incident = ();
+        type Exitant = ();
+
+        fn active(&self, _: u32) -> Option<Rgb> {
+            Some(Rgb::splat(GLOSSY))
+        }
+        fn clear(&self, (): &mut ()) {}
+        fn receive(&self, (): &mut (), _: &Transfer) {}
+        fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], _: Arrived) {}
+        fn radiance(&self, (): &(), _: Vec3) -> Rgb {
+            Rgb::ONE
+        }
+        fn radiance_bounds(&self, (): &(), _: &Cone) -> (Rgb, Rgb) {
+            (Rgb::ONE, Rgb::ONE)
+        }
+    }
+
+    /// What links carry is cut to what is not reflected diffusely, loosely; where light went on growing to what can be reflected at all.
+    #[test]
+    fn links_carry_no_more_than_there_is() {
+        let square = |o: DVec3, a: DVec3, b: DVec3| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), 0);
+        let surfaces = vec![square(DVec3::ZERO, DVec3::X, DVec3::Y), square(DVec3::Z, DVec3::Y, DVec3::X)];
+        let material = DiffuseMaterial { reflectance: Rgb::splat(DIFFUSE), exitance: Rgb::ONE, two_sided: false };
+        let input = SceneInput { surfaces, materials: vec![material], ..SceneInput::default() };
+        let mut solver = Solver::new(&input, Settings::with_error(0.2), Gloss).expect("the scene is sound");
+        solver.solve(&mut |_| std::ops::ControlFlow::Continue(()));
+        let (light, count) = (solver.light(), solver.elements.nodes.len());
+        let irradiance = vec![Rgb::ONE; count];
+        let directional = vec![Rgb::ONE; solver.links.all().len()];
+        let lit: Vec<f32> = solver.links.all().iter().map(|link| light.element(link.receiver).area).collect();
+        // Of unit irradiance, what leaves may send by directional light, as seen by the one that is cut most.
+        let allowed = |most: f32| {
+            let of = |share: f32| {
+                let carried: Vec<Rgb> = directional.iter().map(|light| *light * share).collect();
+                let gains = gains(light, &solver.links, (&carried, &lit), &vec![most; count], &irradiance);
+                gains.into_iter().fold(1.0, f32::min)
+            };
+            // All is cut in proportion, once it is.
+            let uncut = of(1e3);
+            assert!((of(2e3) / uncut - 0.5).abs() < 1e-3, "cut in proportion");
+            assert_eq!(of(1e-6), 1.0, "next to nothing is not cut");
+            uncut
+        };
+        let (freely, reined) = (allowed(FREELY), allowed(STRICTLY));
+        let exact = STRICTLY * MOST_GAIN * GLOSSY / (FREELY * (1.0 - DIFFUSE));
+        assert!((reined / freely - exact).abs() < 1e-3, "{reined} and {freely}");
+    }
 }
