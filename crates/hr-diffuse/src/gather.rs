@@ -10,6 +10,7 @@ use crate::leaf_rows::balance;
 use crate::links::{Link, Links};
 use crate::places::Places;
 use crate::push::{self, Push, Spread, Weight, visible};
+use crate::reflect::Sends;
 use crate::shooting::Shot;
 use crate::threads::{self, prelude::*};
 use crate::transport::Light;
@@ -323,12 +324,13 @@ impl Gather {
     }
 
     /// Asks senders what they send over their links: all of them where it is not known for these links, else those that
-    /// send something else now. Returns the number of links over which they need not be asked.
+    /// send something else now. What comes over a link in proportion to what came is known without. Returns the number of links over
+    /// which they need not be asked.
     pub(crate) fn ask<L: LightField>(
         &mut self,
         light: Light<'_, L>,
         links: &Links,
-        sends_else: impl Fn(u32) -> bool + Sync,
+        sends: impl Fn(u32) -> Sends + Sync,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> ControlFlow<(), u64> {
         if !light.element(0).active {
@@ -343,11 +345,13 @@ impl Gather {
                 return ControlFlow::Break(());
             }
             let asked = directional.par_iter_mut().zip(links).with_min_len(64);
-            asked.filter(|(_, link)| !knows || sends_else(link.sender)).for_each(|(directional, link)| {
-                *directional = light.directional_toward(link.sender, link.receiver);
+            asked.for_each(|(directional, link)| match sends(link.sender) {
+                Sends::Same if knows => (),
+                Sends::InProportion(times) if knows => *directional *= times,
+                _ => *directional = light.directional_toward(link.sender, link.receiver),
             });
         }
-        let steady = |link: &&Link| knows && light.element(link.sender).active && !sends_else(link.sender);
+        let steady = |link: &&Link| knows && light.element(link.sender).active && sends(link.sender) != Sends::Else;
         ControlFlow::Continue(links.all().iter().filter(steady).count() as u64)
     }
 
@@ -362,7 +366,7 @@ impl Gather {
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let chunk = BETWEEN_WATCHES * threads::current_num_threads();
-        self.ask(light, links, |_| false, watch)?;
+        self.ask(light, links, |_| Sends::Same, watch)?;
         let mut arriving = std::mem::take(&mut self.arriving);
         arriving.resize(links.all().len(), Rgb::ZERO);
         for (i, irradiances) in arriving.chunks_mut(chunk).enumerate() {

@@ -58,6 +58,20 @@ pub(crate) enum Reflect {
     Changed,
 }
 
+/// What leaves send counts as in proportion to what they sent where their shares of it have changed by less than this.
+const SAME_SHAPE: f32 = 1e-4;
+
+/// What a node sends now, compared with what it sent before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Sends {
+    /// The same.
+    Same,
+    /// So many times as much in every direction, by channel.
+    InProportion(Rgb),
+    /// Something else.
+    Else,
+}
+
 /// Leaves, and the area that each stands for.
 type Areas = SmallVec<[(u32, f32); 16]>;
 
@@ -201,6 +215,27 @@ fn thinned(all: Vec<(u32, f32)>, seed: u32) -> Areas {
     chosen
 }
 
+/// What leaves send, the same ones reflecting the same, by their strengths.
+fn compared(now: &[Representative], before: &[Representative]) -> Sends {
+    if now == before {
+        return Sends::Same;
+    }
+    let same_leaves = now.len() == before.len()
+        && now.iter().zip(before).all(|(now, before)| (now.leaf, now.share) == (before.leaf, before.share));
+    let (mut low, mut high) = (Rgb::INFINITY, Rgb::ZERO);
+    for (now, before) in now.iter().zip(before) {
+        let times = Rgb::select(now.strength.cmpeq(before.strength), Rgb::ONE, now.strength / before.strength);
+        if !times.is_finite() {
+            return Sends::Else;
+        }
+        (low, high) = (low.min(times), high.max(times));
+    }
+    if same_leaves && (high - low).cmple(SAME_SHAPE * high).all() {
+        return Sends::InProportion(0.5 * (low + high));
+    }
+    Sends::Else
+}
+
 impl<L: LightField> Solver<L> {
     /// Leaves that stand for others, by the links that there are.
     pub(crate) fn face_clusters(&self) -> FaceClusters {
@@ -215,9 +250,9 @@ impl<L: LightField> Solver<L> {
         }
         let shot = self.shot.take();
         let new = shot.as_ref().map(|shot| shot.new.as_slice());
-        let (changed, sends_else) = self.reflect_standing(new, how, watch);
+        let (changed, sends) = self.reflect_standing(new, how, watch);
         let mut gather = std::mem::take(&mut self.gather);
-        let asked = gather.ask(self.light(), &self.links, |sender| sends_else[sender as usize], watch);
+        let asked = gather.ask(self.light(), &self.links, |sender| sends[sender as usize], watch);
         if let ControlFlow::Continue(steady) = asked {
             self.stats.skipped.steady_senders += steady;
         }
@@ -231,14 +266,14 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Reflects the light of the leaves that stand for what the links ask for, where it has changed, or `new` light (by
-    /// leaf) in the place of what they reflected before; until `watch` breaks. Tells whether any has, and by node whether
-    /// it sends something else now.
+    /// leaf) in the place of what they reflected before; until `watch` breaks. Tells whether any has, and by node what it
+    /// sends now.
     fn reflect_standing(
         &mut self,
         new: Option<&[Rgb]>,
         how: Reflect,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> (bool, Vec<bool>) {
+    ) -> (bool, Vec<Sends>) {
         let count = self.elements.nodes.len();
         self.sent.resize(count, Sent::NOTHING);
         self.brightest.resize(count, 0.0);
@@ -282,23 +317,27 @@ impl<L: LightField> Solver<L> {
         let before = (std::mem::replace(&mut self.exitant.senders, senders), self.exitant.reflected_as.clone());
         self.refer(&changed);
         let all = new.is_some() || !self.skips.steady_senders;
-        let sends_else = if all { vec![true; count] } else { self.sends_else(&before, &changed) };
-        (!changed.is_empty(), sends_else)
+        let sends = if all { vec![Sends::Else; count] } else { self.sends(&before, &changed) };
+        (!changed.is_empty(), sends)
     }
 
-    /// By node, whether it sends something else than `before`, as other leaves stand for it, they have changed, or shine otherwise.
-    fn sends_else(&self, (senders, reflected_as): &(Senders, Vec<u32>), changed: &[u32]) -> Vec<bool> {
+    /// By node, what it sends compared with `before`: something else where other leaves stand for it, they have changed, or they shine
+    /// otherwise among each other.
+    fn sends(&self, (senders, reflected_as): &(Senders, Vec<u32>), changed: &[u32]) -> Vec<Sends> {
         let mut has_changed = vec![false; self.elements.nodes.len()];
         changed.iter().for_each(|&leaf| has_changed[leaf as usize] = true);
         let now = &self.exitant;
-        let states: Vec<bool> = (0..has_changed.len() as u32)
+        let states: Vec<Sends> = (0..has_changed.len() as u32)
             .map(|node| {
                 let standing = now.senders.of(node);
-                standing != senders.of(node) || standing.iter().any(|standing| has_changed[standing.leaf as usize])
+                let changed = standing.iter().any(|standing| has_changed[standing.leaf as usize]);
+                if changed { Sends::Else } else { compared(standing, senders.of(node)) }
             })
             .collect();
-        let differs = |(node, state): (usize, &u32)| reflected_as.get(node) != Some(state) || states[*state as usize];
-        now.reflected_as.iter().enumerate().map(differs).collect()
+        let sends = |(node, &state): (usize, &u32)| {
+            if reflected_as.get(node) == Some(&state) { states[state as usize] } else { Sends::Else }
+        };
+        now.reflected_as.iter().enumerate().map(sends).collect()
     }
 
     /// Finds out which differences of the light of leaves are too small for any link to tell: what a link makes of them counts
@@ -466,5 +505,38 @@ impl<L: LightField> Solver<L> {
         shading.map_or(0.0, |normals| {
             normals.iter().map(|n| n.normalize_or(normal).dot(normal).clamp(0.0, 1.0).acos()).fold(0.0, f32::max)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIT: Representative = Representative { leaf: 0, share: 0.5, strength: Rgb::ONE };
+
+    /// What two leaves send that sent as told before.
+    fn sends(before: [Rgb; 2], now: [Rgb; 2]) -> Sends {
+        let of = |strengths: [Rgb; 2]| strengths.map(|strength| Representative { strength, ..LIT });
+        compared(&of(now), &of(before))
+    }
+
+    #[test]
+    fn leaves_that_change_alike_send_in_proportion() {
+        let (dim, red) = (Rgb::splat(0.5), Rgb::new(0.5, 0.25, 0.0));
+        assert_eq!(sends([Rgb::ONE, dim], [Rgb::ONE, dim]), Sends::Same);
+        assert_eq!(sends([Rgb::ONE, dim], [red, dim * red]), Sends::InProportion(red), "each channel by itself");
+        assert_eq!(sends([Rgb::ONE, dim], [red, dim]), Sends::Else, "one is what it was");
+        assert_eq!(sends([Rgb::ZERO, dim], [dim, dim]), Sends::Else, "one was dark");
+        assert_eq!(sends([Rgb::X, Rgb::X], [red, red]), Sends::Else, "green is there now");
+        assert_eq!(sends([red, red], [red * 2.0; 2]), Sends::InProportion(Rgb::new(2.0, 2.0, 1.0)), "dark stays dark");
+    }
+
+    #[test]
+    fn other_leaves_send_something_else() {
+        let other = Representative { leaf: 1, ..LIT };
+        let more = Representative { share: 1.0, ..LIT };
+        for now in [vec![other], vec![more], vec![LIT, other], vec![]] {
+            assert_eq!(compared(&now, &[LIT]), Sends::Else, "{now:?}");
+        }
     }
 }

@@ -10,11 +10,12 @@
 use crate::error::SolveError;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
+use crate::reflect::Reflect;
 use crate::sent::Sent;
 use crate::solver::{Progress, Solver, check, unit_lights};
 use crate::stats::Stats;
 use crate::transport::Exitant;
-use crate::{Light, LightKind, Rgb, SceneInput};
+use crate::{Light, LightKind, Rgb, SceneInput, Transport};
 use std::f32::consts::PI;
 use std::ops::ControlFlow;
 
@@ -260,11 +261,17 @@ impl<L: LightField> Solver<L> {
     /// Iterates until light has settled, over the links that there are.
     fn settle_anew(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let mut stopped = false;
-        self.pull();
         if self.stats.iterations > 0 {
             self.stats.residuals.clear();
             self.stats.error = None;
             self.restart();
+            if self.settings.transport == Transport::Gather {
+                // The extension's light has changed as that which arrives.
+                self.reflect_senders(Reflect::InProportion, &mut || ControlFlow::Continue(()));
+            }
+        }
+        self.pull();
+        if self.stats.iterations > 0 {
             self.settle_again(&mut stopped, watch);
         }
         self.stats.stopped = stopped;

@@ -11,7 +11,7 @@ pub(crate) struct Sent {
     times: Rgb,
     /// So many times as much as was reflected is sent now.
     strength: Rgb,
-    /// What was negligible of it ([`Arrived::negligible`](crate::hooks::Arrived)).
+    /// What was negligible of what was reflected ([`Arrived::negligible`](crate::hooks::Arrived)).
     negligible: f32,
 }
 
@@ -45,9 +45,9 @@ impl Sent {
         (now - self.irradiance).abs().max_element()
     }
 
-    /// See [`Arrived::negligible`](crate::hooks::Arrived).
-    pub(crate) const fn negligible(&self) -> f32 {
-        self.negligible
+    /// What is negligible of what is sent now: what was of what was reflected (see [`Arrived`](crate::hooks::Arrived)), in proportion.
+    pub(crate) fn negligible(&self) -> f32 {
+        self.negligible * self.strength.max_element()
     }
 
     /// Where it was to be expected that so many times as much arrives, that is no change.
@@ -86,6 +86,15 @@ mod tests {
         assert_eq!(sent.follow(Rgb::ZERO, STEP), Rgb::new(0.0, 0.0, 1.0), "it is dark now");
         assert_eq!(sent.follow(Rgb::new(2.0, 1.0, 0.0), STEP), Rgb::ONE, "and light again");
         assert_eq!(sent.follow(Rgb::splat(f32::MAX), STEP).x, 0.5 * f32::MAX, "as far as numbers go");
+    }
+
+    /// Where all light is dimmed, what is negligible is dimmed with it: nothing need be looked at more closely.
+    #[test]
+    fn what_is_negligible_follows_what_is_sent() {
+        let mut sent = Sent::of(Rgb::ONE, 0.2);
+        assert_eq!(sent.negligible(), 0.2);
+        sent.follow(Rgb::new(0.25, 0.5, 0.1), STEP);
+        assert_eq!(sent.negligible(), 0.1, "as its strongest channel");
     }
 
     #[test]

@@ -13,7 +13,7 @@ pub(crate) struct Skips {
     pub(crate) proofs: bool,
     pub(crate) sealed_sides: bool,
     pub(crate) converged_leaves: bool,
-    /// Links over which a sender sends the same directional light as before.
+    /// Links over which a sender sends the same directional light as before, or so many times as much.
     pub(crate) steady_senders: bool,
     /// A look from each leaf at links that bring next to nothing.
     pub(crate) faint_links: bool,

@@ -67,7 +67,7 @@ pub struct Skipped {
     pub sealed_sides: u64,
     /// Leaves whose incident light did not change enough to be reflected anew.
     pub converged_leaves: u64,
-    /// Links whose senders were not asked for their directional light in an iteration, as it is what it was.
+    /// Links whose senders were not asked for their directional light in an iteration, as it is what it was, or in proportion.
     pub steady_senders: u64,
     /// Links that bring so little that leaves do not look for themselves what they bring there.
     pub faint_links: u64,

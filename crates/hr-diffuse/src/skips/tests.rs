@@ -238,7 +238,8 @@ fn senders_that_send_the_same_change_nothing() {
     let without = solve(&input, 0.1, field(), Skips { steady_senders: false, ..Skips::ALL });
     assert!(with.stats.skipped.steady_senders > 1000, "{:?}", with.stats.skipped);
     assert_eq!(without.stats.skipped.steady_senders, 0, "none is skipped");
-    assert_same(&with, &without, 0.0);
+    // What is known in proportion is rounded otherwise.
+    assert_same(&with, &without, 1e-4);
 }
 
 /// The room with its floor in many pieces, which reflect like the other walls.
