@@ -162,6 +162,8 @@ pub struct Solver<L: LightField = ()> {
     pub(crate) skips: Skips,
     /// What is left to be done.
     pub(crate) unfinished: Unfinished,
+    /// Passes done by [`step`](Solver::step) since a solve began; 0 before and after.
+    passes: usize,
     /// What arrives through the links there are.
     pub(crate) gather: Gather,
     /// Whether it is known for these links as well as it can be.
@@ -271,6 +273,7 @@ impl<L: LightField> Solver<L> {
             feedback: Feedback::default(),
             brightest: Vec::new(),
             area,
+            passes: 0,
             convergence: Convergence::default(),
         };
         solver.linked = solver.linked();
@@ -278,15 +281,25 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Solves. `watch` is told how far it is every few milliseconds, and may break: then the solution is what there is by
-    /// then, and [`Stats::stopped`] is set. Where a [`Budget`] is spent, light settles over what is linked by then, and
-    /// [`Stats::spent`] tells which one it was.
+    /// then, and [`Stats::stopped`] is set; to solve again goes on from there. Where a [`Budget`] is spent, light settles over what is
+    /// linked by then, and [`Stats::spent`] tells which one it was.
     pub fn solve(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        while self.step(watch) {}
+    }
+
+    /// Does the next pass of a [`solve`](Self::solve), each of which is finer than the one before and ends with all light in place: in
+    /// between a host can show a finished clone, and turn to other things. All passes before leaves look closely, three of most solves,
+    /// take about a tenth of the time. Returns whether there is a next one: not where all is done, `watch` broke, or a [`Budget`] is spent. A budget of time counts
+    /// what passes between steps, too.
+    pub fn step(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> bool {
         let mut stopped = false;
-        self.unfinished.renew(&mut self.links, self.elements.nodes.len());
-        let (mut number, mut goes_on) = (0, None);
+        if self.passes == 0 {
+            self.unfinished.renew(&mut self.links, self.elements.nodes.len());
+        }
+        let (mut is_left, mut goes_on) = (false, None);
         while let Some(tolerance) = self.unfinished.next(self.settings.error) {
             let (reflects, closely) = is_worth(tolerance, self.settings.error);
-            let pass = Pass { number, tolerance, reflects, closely };
+            let pass = Pass { number: self.passes, tolerance, reflects, closely };
             self.refine(pass, &mut stopped, watch);
             if stopped {
                 // New elements have their parents' light.
@@ -312,7 +325,15 @@ impl<L: LightField> Solver<L> {
                 break;
             }
             self.unfinished.done(tolerance, found.as_ref());
-            number += 1;
+            self.passes += 1;
+            // Where a budget is spent light settles first.
+            if self.stats.spent.is_none() {
+                is_left = self.unfinished.next(self.settings.error).is_some();
+                break;
+            }
+        }
+        if !is_left {
+            self.passes = 0;
         }
         if let Some(before) = goes_on {
             (self.unfinished.tolerance, self.unfinished.found) = before;
@@ -331,6 +352,7 @@ impl<L: LightField> Solver<L> {
         self.stats.nodes = self.elements.nodes.len() as u64;
         self.stats.leaves = self.elements.patch_leaves().count() as u64;
         self.stats.links = self.links.all().len() as u64;
+        is_left
     }
 
     /// Finds out how the light of the links of a pass reaches leaves.
@@ -365,6 +387,7 @@ impl<L: LightField> Solver<L> {
             }
         }
         self.forget_reshaped(stopped);
+        self.passes = 0;
         self.solve(&mut |progress| if stopped { ControlFlow::Break(()) } else { watch(progress) });
     }
 

@@ -67,6 +67,39 @@ fn what_comes_out_early_is_the_light_so_far() {
     }
 }
 
+/// Pass by pass the same is done as at once, and there is light to show after each.
+#[test]
+fn steps_end_where_a_solve_does() {
+    let room = Room::new();
+    let solver = || {
+        let field = GlossyField::new(&room.reflectors, Refinement::default());
+        Solver::new(&room.input, Settings::with_error(0.2), field).expect("the room is sound")
+    };
+    let go_on = &mut |_: &Progress| ControlFlow::Continue(());
+    let mut whole = solver();
+    whole.solve(go_on);
+    let mut stepwise = solver();
+    let mut links = Vec::new();
+    while stepwise.step(go_on) {
+        links.push(stepwise.stats().links);
+        if links.len() == 1 {
+            assert_sane(&stepwise.clone().finish(go_on), "after a step");
+        }
+    }
+    assert!(links.len() >= 3 && links.is_sorted(), "each is finer: {links:?}");
+    assert_eq!(stepwise.exitant().irradiance, whole.exitant().irradiance, "the same light");
+    assert_eq!(stepwise.stats().rays, whole.stats().rays, "by the same work");
+    assert!(!stepwise.step(go_on), "nothing is left");
+    assert_eq!(stepwise.stats().rays, whole.stats().rays, "so nothing is done");
+    // Broken in its second step, it goes on from there.
+    let mut broken = solver();
+    assert!(broken.step(go_on));
+    assert!(!broken.step(&mut |_| ControlFlow::Break(())) && broken.stats().stopped, "it is marked");
+    broken.solve(go_on);
+    let ratio = broken.exitant().irradiance[0] / whole.exitant().irradiance[0];
+    assert!(!broken.stats().stopped && (ratio - 1.0).abs().max_element() < 0.1, "{ratio} of the light");
+}
+
 /// However large the scene: between two calls lies a bounded number of pairs, leaves or vertices.
 #[test]
 fn calls_are_as_many_as_the_work_asks_for() {
