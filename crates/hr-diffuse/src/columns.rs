@@ -62,33 +62,13 @@ pub(crate) fn gains<L: LightField>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hooks::{Arrived, Hierarchy, NodeId, Transfer};
-    use crate::{Cone, DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
-    use glam::{DVec3, Vec3};
+    use crate::skips::tests::Echo;
+    use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::DVec3;
+    use std::ops::ControlFlow;
 
     const DIFFUSE: f32 = 0.7;
     const GLOSSY: f32 = 0.1;
-
-    /// Reflects little beside the diffuse part.
-    struct Gloss;
-
-    impl LightField for Gloss {
-        type Incident = ();
-        type Exitant = ();
-
-        fn active(&self, _: u32) -> Option<Rgb> {
-            Some(Rgb::splat(GLOSSY))
-        }
-        fn clear(&self, (): &mut ()) {}
-        fn receive(&self, (): &mut (), _: &Transfer) {}
-        fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], _: Arrived) {}
-        fn radiance(&self, (): &(), _: Vec3) -> Rgb {
-            Rgb::ONE
-        }
-        fn radiance_bounds(&self, (): &(), _: &Cone) -> (Rgb, Rgb) {
-            (Rgb::ONE, Rgb::ONE)
-        }
-    }
 
     /// What links carry is cut to what is not reflected diffusely, loosely; where light went on growing to what can be reflected at all.
     #[test]
@@ -97,8 +77,9 @@ mod tests {
         let surfaces = vec![square(DVec3::ZERO, DVec3::X, DVec3::Y), square(DVec3::Z, DVec3::Y, DVec3::X)];
         let material = DiffuseMaterial { reflectance: Rgb::splat(DIFFUSE), exitance: Rgb::ONE, two_sided: false };
         let input = SceneInput { surfaces, materials: vec![material], ..SceneInput::default() };
-        let mut solver = Solver::new(&input, Settings::with_error(0.2), Gloss).expect("the scene is sound");
-        solver.solve(&mut |_| std::ops::ControlFlow::Continue(()));
+        let field = Echo { material: 0, albedo: GLOSSY, errs: false };
+        let mut solver = Solver::new(&input, Settings::with_error(0.2), field).expect("the scene is sound");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
         let (light, count) = (solver.light(), solver.elements.nodes.len());
         let irradiance = vec![Rgb::ONE; count];
         let directional = vec![Rgb::ONE; solver.links.all().len()];

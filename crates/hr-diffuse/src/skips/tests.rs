@@ -182,11 +182,11 @@ fn iterations_that_are_left_out_would_change_nothing() {
 }
 
 /// Diffuse reflection of one material by an extension: radiance is the same in all directions.
-struct Echo {
-    material: u32,
-    albedo: f32,
+pub(crate) struct Echo {
+    pub(crate) material: u32,
+    pub(crate) albedo: f32,
     /// Whether it takes all liberty that it has: each leaf errs by as much as is negligible, up to all of its light.
-    errs: bool,
+    pub(crate) errs: bool,
 }
 
 impl LightField for Echo {
