@@ -92,10 +92,10 @@ mod tests {
                 gains.into_iter().fold(1.0, f32::min)
             };
             // All is cut in proportion, once it is.
-            let uncut = of(1e3);
-            assert!((of(2e3) / uncut - 0.5).abs() < 1e-3, "cut in proportion");
+            let cut = of(1e3);
+            assert!((of(2e3) / cut - 0.5).abs() < 1e-3, "cut in proportion");
             assert_eq!(of(1e-6), 1.0, "next to nothing is not cut");
-            uncut
+            cut
         };
         let (freely, reined) = (allowed(FREELY), allowed(STRICTLY));
         let exact = STRICTLY * MOST_GAIN * GLOSSY / (FREELY * (1.0 - DIFFUSE));

@@ -222,6 +222,9 @@ fn compared(now: &[Representative], before: &[Representative]) -> Sends {
     }
     let same_leaves = now.len() == before.len()
         && now.iter().zip(before).all(|(now, before)| (now.leaf, now.share) == (before.leaf, before.share));
+    if !same_leaves {
+        return Sends::Else;
+    }
     let (mut low, mut high) = (Rgb::INFINITY, Rgb::ZERO);
     for (now, before) in now.iter().zip(before) {
         let times = Rgb::select(now.strength.cmpeq(before.strength), Rgb::ONE, now.strength / before.strength);
@@ -230,10 +233,8 @@ fn compared(now: &[Representative], before: &[Representative]) -> Sends {
         }
         (low, high) = (low.min(times), high.max(times));
     }
-    if same_leaves && (high - low).cmple(SAME_SHAPE * high).all() {
-        return Sends::InProportion(0.5 * (low + high));
-    }
-    Sends::Else
+    let is_same_shape = (high - low).cmple(SAME_SHAPE * high).all();
+    if is_same_shape { Sends::InProportion(0.5 * (low + high)) } else { Sends::Else }
 }
 
 impl<L: LightField> Solver<L> {

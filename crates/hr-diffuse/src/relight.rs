@@ -12,7 +12,7 @@ use crate::hierarchy::{Elements, Kind};
 use crate::hooks::LightField;
 use crate::reflect::Reflect;
 use crate::sent::Sent;
-use crate::solver::{Progress, Solver, check, unit_lights};
+use crate::solver::{Phase, Progress, Solver, check, unit_lights};
 use crate::stats::Stats;
 use crate::transport::Exitant;
 use crate::{Light, LightKind, Rgb, SceneInput, Transport};
@@ -267,7 +267,11 @@ impl<L: LightField> Solver<L> {
             self.restart();
             if self.settings.transport == Transport::Gather {
                 // The extension's light has changed as that which arrives.
-                self.reflect_senders(Reflect::InProportion, &mut || ControlFlow::Continue(()));
+                let progress = self.progress(Phase::Transport, 0.0);
+                self.reflect_senders(Reflect::InProportion, &mut || {
+                    stopped = stopped || watch(&progress).is_break();
+                    if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                });
             }
         }
         self.pull();

@@ -289,8 +289,8 @@ impl<L: LightField> Solver<L> {
 
     /// Does the next pass of a [`solve`](Self::solve), each of which is finer than the one before and ends with all light in place: in
     /// between a host can show a finished clone, and turn to other things. All passes before leaves look closely, three of most solves,
-    /// take about a tenth of the time. Returns whether there is a next one: not where all is done, `watch` broke, or a [`Budget`] is spent. A budget of time counts
-    /// what passes between steps, too.
+    /// take about a tenth of the time. Returns whether there is a next one: not where all is done, `watch` broke, or a [`Budget`] is
+    /// spent. A budget of time counts what passes between steps, too.
     pub fn step(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> bool {
         let mut stopped = false;
         if self.passes == 0 {
