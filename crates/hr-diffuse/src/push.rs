@@ -17,7 +17,7 @@ use crate::places::{Edges, Places};
 use crate::sampling::hash;
 use crate::segments::{receiving_point, visibility};
 use crate::threads::{self, prelude::*};
-use crate::transport::{Light, NEGLIGIBLE};
+use crate::transport::{Light, negligible};
 use crate::visibility::Proof;
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
@@ -33,8 +33,9 @@ const FAINT_SHARE: f32 = 0.003;
 const OWN_SHARE: f32 = 0.02;
 /// Leaves and senders whose radii together are below this share of their distance are far from each other.
 const FAR: f32 = 0.25;
-/// Links that bring a leaf more than this share of its light from near by are looked at from several points of it.
-const MUCH: f32 = 0.01;
+/// Links that bring a leaf more than this share of its light from near by, times the square root of the tolerance, are looked at from
+/// several points of it.
+const MUCH_SHARE: f32 = 0.045;
 /// Points of a place lie across a line if they do by this share of their spread (of squares).
 const LEAST_SPREAD: f32 = 0.01;
 /// Irradiance × importance × √(share of all area) that a place of many leaves may be off its mean by for the edge of a shadow, as a
@@ -402,8 +403,8 @@ impl Place {
             node,
             middle: (middle, element.normals.axis, 1.0),
             points: points_of(light, node),
-            much: MUCH * irradiance.element_sum(),
-            negligible: NEGLIGIBLE * irradiance.max_element(),
+            much: MUCH_SHARE * error.sqrt() * irradiance.element_sum(),
+            negligible: negligible(irradiance, error),
             faint: FAINT_SHARE * error.sqrt() * irradiance.element_sum(),
             uneven: UNEVEN_SHARE * error * irradiance.element_sum(),
         }
@@ -480,7 +481,7 @@ impl Place {
         let shared = is_shared(light, link.receiver);
         let here = if !shared {
             Weight { value: mean, ..Weight::default() }
-        } else if !element.is_patch() || !far && (mean * visible > self.much || !flat) {
+        } else if !element.is_patch() || !far && mean * visible > self.much {
             self.varying(light, link)
         } else if flat {
             let (x, n, _) = self.middle;

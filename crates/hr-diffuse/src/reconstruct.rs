@@ -16,7 +16,7 @@ use crate::rows::{self, Correction, Row, look_around};
 use crate::sampling::hash;
 use crate::segments::visibility_at;
 use crate::threads::{self, prelude::*};
-use crate::transport::{Light, NEGLIGIBLE};
+use crate::transport::{Light, negligible};
 use crate::vertices::{Vertices, outlines, point_on};
 use crate::within::Within;
 use crate::{Facing, Rgb};
@@ -104,7 +104,9 @@ pub(crate) fn reconstruct<L: LightField>(
                 let (afar, seed) = (&from_afar[vertex], seed(vertices.positions[vertex]));
                 let spots = || footprint(light, (&vertices, vertex as u32), (COVER, seed));
                 let gather = |place: (u32, Vec2)| {
-                    gather_at(light, (links, &spreads, &shares), place, (afar, near.of(place.0)), (seed, &spots))
+                    let negligible = negligible(light.exitant.irradiance[place.0 as usize], error);
+                    let inherited = (afar, near.of(place.0));
+                    gather_at(light, (links, &spreads, &shares), (place, negligible), inherited, (seed, &spots))
                 };
                 let mut gathering = gather((vertices.leaf[vertex], places[vertex]));
                 // What covers one of the leaves around need not cover another.
@@ -189,19 +191,18 @@ fn uncover(vertices: &mut Vertices, covered: &[bool]) {
     }
 }
 
-/// Irradiance at a point of a leaf, gathered over all links that light it; how much is seen of their senders from all over a footprint,
+/// Irradiance at a point of a leaf, gathered over all links that light it, but roughly from senders that bring less than is `negligible`; how much is seen of their senders from all over a footprint,
 /// which is asked for where that has to be found out.
 fn gather_at<L: LightField>(
     light: Light<'_, L>,
     (links, spreads, shares): (&Links, &[Spread], &[f32]),
-    (leaf, uv): (u32, Vec2),
+    ((leaf, uv), negligible): ((u32, Vec2), f32),
     (inherited, near): (&[Brought; 3], &[u32]),
     (seed, spots): (u32, &impl Fn() -> Footprint),
 ) -> Gathering {
     let element = light.element(leaf);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv);
     let mut arriving: SmallVec<[Arriving; 128]> = SmallVec::new();
-    let negligible = NEGLIGIBLE * light.exitant.irradiance[leaf as usize].max_element();
     let mut total: f32 = inherited.iter().map(|brought| brought.irradiance.max_element()).sum();
     let mut look = |at: usize| {
         let link = &links.all()[at];

@@ -20,8 +20,8 @@ const MISJUDGED: f32 = 0.03;
 /// Levels of parts that are looked at for it. Moments add up, so only that of surfaces tells something new.
 const PART_LEVELS: u32 = 3;
 
-/// Senders that cannot bring more than this share of a place's irradiance are negligible there.
-pub(crate) const NEGLIGIBLE: f32 = 1e-2;
+/// Senders that cannot bring more than this share of a place's irradiance, times the square root of the tolerance, are negligible there.
+const NEGLIGIBLE_SHARE: f32 = 0.065;
 
 /// Exitant diffuse light per node.
 #[derive(Clone, Debug, Default)]
@@ -64,6 +64,11 @@ pub struct Light<'a, L: LightField> {
 /// that grows toward 1 more softly will do: it takes a fourth of the light of a lamp that is a sphere of triangles, at 4 radii.
 fn afar(area: f32, distance2: f32) -> f32 {
     (area / (PI * distance2)).min(1.0)
+}
+
+/// What is negligible at a place with this irradiance, for a solution with this relative error (largest channel).
+pub(crate) fn negligible(irradiance: Rgb, error: f32) -> f32 {
+    NEGLIGIBLE_SHARE * error.sqrt() * irradiance.max_element()
 }
 
 impl<L: LightField> Clone for Light<'_, L> {
