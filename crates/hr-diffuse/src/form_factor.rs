@@ -802,6 +802,11 @@ fn ring(Part { geometry, domain, back }: Part<'_>, x: DVec3, n: DVec3, rule: &[(
 }
 
 fn curved(geometry: &Geometry, domain: Domain, back: bool, x: Vec3, n: Vec3, depth: u32) -> f32 {
+    let by_parts = || geometry.split(domain).into_iter().map(|part| curved(geometry, part, back, x, n, depth - 1)).sum();
+    let bent = (domain.u1 - domain.u0).abs().max((domain.v1 - domain.v0).abs()) > CURVED_BENT;
+    if bent && depth > 0 {
+        return by_parts();
+    }
     let point = geometry.point(geometry.middle(domain));
     let area = geometry.area(domain);
     let radius2 = geometry
@@ -809,16 +814,20 @@ fn curved(geometry: &Geometry, domain: Domain, back: bool, x: Vec3, n: Vec3, dep
         .iter()
         .map(|&corner| geometry.point(corner).distance_squared(point))
         .fold(area * 0.25, f32::max);
-    let bent = (domain.u1 - domain.u0).abs().max((domain.v1 - domain.v0).abs()) > CURVED_BENT;
-    if depth == 0 || radius2 < CURVED_FAR * CURVED_FAR * point.distance_squared(x) && !bent {
-        let side = if back { -1.0 } else { 1.0 };
-        let points = geometry.quadrature(domain);
-        return points
-            .iter()
-            .map(|&(uv, weight)| kernel(x, n, geometry.point(uv), geometry.normal(uv) * side, area * weight))
-            .sum();
+    let to = point - x;
+    let above = to.dot(n);
+    if above < 0.0 && above * above > radius2 {
+        return 0.0;
     }
-    geometry.split(domain).into_iter().map(|part| curved(geometry, part, back, x, n, depth - 1)).sum()
+    if depth == 0 || radius2 < CURVED_FAR * CURVED_FAR * to.length_squared() {
+        let side = if back { -1.0 } else { 1.0 };
+        let at = |(uv, weight)| {
+            let (point, normal) = geometry.point_and_normal(uv);
+            kernel(x, n, point, normal * side, area * weight)
+        };
+        return geometry.quadrature(domain).into_iter().map(at).sum();
+    }
+    by_parts()
 }
 
 #[cfg(test)]

@@ -552,7 +552,11 @@ pub(crate) fn sample_points(scene: &SceneData, element: &Element) -> SmallVec<[(
     let geometry = &scene.surfaces()[element.source as usize];
     let side = if element.kind == Kind::Back { -1.0 } else { 1.0 };
     let points = geometry.quadrature(element.domain);
-    points.into_iter().map(|(uv, weight)| (geometry.point(uv), geometry.normal(uv) * side, weight)).collect()
+    let at = |(uv, weight)| {
+        let (point, normal) = geometry.point_and_normal(uv);
+        (point, normal * side, weight)
+    };
+    points.into_iter().map(at).collect()
 }
 
 #[cfg(test)]

@@ -145,7 +145,8 @@ impl Geometry {
         for (i, facet) in facets.iter_mut().enumerate() {
             let step = |k: usize| (k as f32 + 0.5) / SIDE as f32;
             let uv = domain.lerp(step(i % SIDE), step(i / SIDE));
-            *facet = Facet { point: self.point(uv), normal: self.normal(uv), area: self.jacobian(uv) };
+            let (point, normal) = self.point_and_normal(uv);
+            *facet = Facet { point, normal, area: self.jacobian(uv) };
             sum += facet.area;
         }
         for facet in &mut facets {

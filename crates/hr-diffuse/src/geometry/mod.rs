@@ -131,6 +131,15 @@ impl Geometry {
         }
     }
 
+    /// Both at the cost of one.
+    #[must_use]
+    pub fn point_and_normal(&self, uv: Vec2) -> (Vec3, Vec3) {
+        match self {
+            Self::Triangle(_) | Self::Quad(_) => (self.point(uv), self.normal(uv)),
+            Self::Revolution(revolution) => revolution.point_and_normal(uv),
+        }
+    }
+
     /// Area per parameter area at (u, v): |∂P/∂u × ∂P/∂v|. 0 at the poles of a sphere and the tip of a cone.
     #[must_use]
     pub fn jacobian(&self, uv: Vec2) -> f32 {
