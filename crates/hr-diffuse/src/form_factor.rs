@@ -802,7 +802,8 @@ fn ring(Part { geometry, domain, back }: Part<'_>, x: DVec3, n: DVec3, rule: &[(
 }
 
 fn curved(geometry: &Geometry, domain: Domain, back: bool, x: Vec3, n: Vec3, depth: u32) -> f32 {
-    let by_parts = || geometry.split(domain).into_iter().map(|part| curved(geometry, part, back, x, n, depth - 1)).sum();
+    let by_parts =
+        || geometry.split(domain).into_iter().map(|part| curved(geometry, part, back, x, n, depth - 1)).sum();
     let bent = (domain.u1 - domain.u0).abs().max((domain.v1 - domain.v0).abs()) > CURVED_BENT;
     if bent && depth > 0 {
         return by_parts();
