@@ -461,6 +461,8 @@ impl Stats {
             steady_senders,
             faint_links,
             inner_vertices,
+            // As what is looked at has changed.
+            unseen_vertices: _,
             joined_leaves,
             shot_links,
         } = skipped;

@@ -19,7 +19,7 @@ use crate::threads::{self, prelude::*};
 use crate::transport::{Light, negligible};
 use crate::vertices::{Vertices, outlines, point_on};
 use crate::within::Within;
-use crate::{Facing, Rgb};
+use crate::{Facing, NodeId, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
 use std::ops::{AddAssign, ControlFlow, Mul};
@@ -41,20 +41,26 @@ const MOST_CHANGE: f64 = 1.5;
 /// Vertices that a thread gathers between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 128;
 
+/// Tells which leaves are seen.
+pub(crate) type Seen<'a> = &'a (dyn Fn(NodeId) -> bool + Sync);
+
 /// What the values at vertices took.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cost {
     pub(crate) rays: u64,
-    /// Vertices that gather nothing, as they lie within places.
+    /// Vertices that gather nothing, as they lie within places, …
     pub(crate) within: u64,
+    /// … or as nobody sees them.
+    pub(crate) unseen: u64,
 }
 
 /// Builds the vertices of a solution with a relative error, which has links to `places` of many leaves where these are known, and
-/// gathers their irradiance. `watch` is told the share that is done; once it breaks, the others take the mean irradiance of the leaves around.
+/// gathers the irradiance of those around leaves that are `seen`. `watch` is told the share that is done; once it breaks, the others
+/// take the mean irradiance of the leaves around, as those do that nobody sees.
 pub(crate) fn reconstruct<L: LightField>(
     light: Light<'_, L>,
     (links, joined): (&Links, Option<&Places>),
-    error: f32,
+    (error, seen): (f32, Seen<'_>),
     watch: &mut dyn FnMut(f32) -> ControlFlow<()>,
 ) -> (Vertices, Cost) {
     let mut layout = outlines(light.scene, light.elements);
@@ -64,19 +70,23 @@ pub(crate) fn reconstruct<L: LightField>(
     let places = contacts.places(light.elements, &vertices);
     let count = vertices.positions.len();
     let within = joined.map_or_else(|| Within::none(&vertices), |joined| Within::new(light, joined, &vertices));
+    let is_seen = |vertex: u32| {
+        let around = vertices.leaves_around(vertex);
+        around.is_empty() || around.iter().any(|&leaf| seen(NodeId(leaf)))
+    };
+    let is_seen: Vec<bool> = (0..count as u32).map(is_seen).collect();
+    let gathers = |vertex: u32| is_seen[vertex as usize] && !within.holds(vertex);
     let mut rays = 0;
     let chunk = BETWEEN_WATCHES * threads::current_num_threads();
     let mut covered = Vec::with_capacity(count);
     let shares = light.reflected_shares();
     let (spreads, _) = spreads(light, links, Some(error));
-    let (from_afar, near) = inherited(light, (links, &spreads, &shares), (&vertices, &places, &within));
+    let (from_afar, near) = inherited(light, (links, &spreads, &shares), (&vertices, &places, &gathers));
     let mut indirect: Vec<f32> = Vec::with_capacity(count);
     for start in (0..count).step_by(chunk) {
         if watch(start as f32 / count as f32).is_break() {
             for vertex in start..count {
-                let around = vertices.leaves_around(vertex as u32);
-                let sum: Rgb = around.iter().map(|&leaf| light.exitant.irradiance[leaf as usize]).sum();
-                vertices.irradiance[vertex] = sum / around.len().max(1) as f32;
+                vertices.irradiance[vertex] = mean_around(light, &vertices, vertex as u32);
             }
             covered.resize(count, false);
             indirect.resize(count, 0.0);
@@ -91,15 +101,10 @@ pub(crate) fn reconstruct<L: LightField>(
                 if around.iter().all(|&leaf| light.element(leaf).importance <= 0.0) {
                     return Gathering::default();
                 }
-                if within.holds(vertex as u32) {
+                if !gathers(vertex as u32) {
                     let indirect: f32 = around.iter().map(|&leaf| light.exitant.indirect[leaf as usize]).sum();
-                    let irradiance: Rgb = around.iter().map(|&leaf| light.exitant.irradiance[leaf as usize]).sum();
-                    let count = around.len() as f32;
-                    return Gathering {
-                        irradiance: irradiance / count,
-                        indirect: indirect / count,
-                        ..Gathering::default()
-                    };
+                    let irradiance = mean_around(light, &vertices, vertex as u32);
+                    return Gathering { irradiance, indirect: indirect / around.len() as f32, ..Gathering::default() };
                 }
                 let (afar, seed) = (&from_afar[vertex], seed(vertices.positions[vertex]));
                 let spots = || footprint(light, (&vertices, vertex as u32), (COVER, seed));
@@ -127,23 +132,31 @@ pub(crate) fn reconstruct<L: LightField>(
             indirect.push(gathering.indirect);
         }
     }
-    agree(light, &mut vertices, &indirect);
+    agree(light, &mut vertices, &indirect, seen);
     uncover(&mut vertices, &covered);
     within.fill(&light.exitant.irradiance, &mut vertices);
-    (vertices, Cost { rays, within: within.count() })
+    let unseen = is_seen.iter().filter(|&&is_seen| !is_seen).count() as u64;
+    (vertices, Cost { rays, within: within.count(), unseen })
+}
+
+/// Mean irradiance of the leaves around a vertex.
+fn mean_around<L: LightField>(light: Light<'_, L>, vertices: &Vertices, vertex: u32) -> Rgb {
+    let around = vertices.leaves_around(vertex);
+    let sum: Rgb = around.iter().map(|&leaf| light.exitant.irradiance[leaf as usize]).sum();
+    sum / around.len().max(1) as f32
 }
 
 /// What vertices gather of reflected light, with links made for something larger, is made to agree with what the leaves around have,
 /// which has been compared with more rays: region by region, so that it stays as smooth as it is. Direct light may vary over a leaf in ways
-/// that its mean does not tell.
-fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, gathered: &[f32]) {
+/// that its mean does not tell. Only leaves that are `seen` are compared: around others not all have gathered.
+fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, gathered: &[f32], seen: Seen<'_>) {
     // Of a solution without reflected light, or one that was stopped before any, there is nothing to agree with.
     if light.exitant.indirect.iter().all(|&indirect| indirect == 0.0) {
         return;
     }
     let compared = |leaf: u32| {
         let element = light.element(leaf);
-        let counts = element.importance > 0.0 && light.elements.exposed(leaf) >= 1.0;
+        let counts = element.importance > 0.0 && light.elements.exposed(leaf) >= 1.0 && seen(NodeId(leaf));
         let mean = vertices.mean(leaf, gathered).filter(|&mean| counts && mean > 0.0);
         let sums = mean.map(|mean| {
             let weight = f64::from(element.area * element.importance);
@@ -344,7 +357,7 @@ impl Near {
 fn inherited<L: LightField>(
     light: Light<'_, L>,
     (links, spreads, shares): (&Links, &[Spread], &[f32]),
-    (vertices, places, within): (&Vertices, &[Vec2], &Within),
+    (vertices, places, gathers): (&Vertices, &[Vec2], &impl Fn(u32) -> bool),
 ) -> (Vec<[Brought; 3]>, Near) {
     let brought = |(link, &spread): (&Link, &Spread)| {
         if !is_inherited(light, link.receiver, spread) {
@@ -357,7 +370,7 @@ fn inherited<L: LightField>(
     let carried: Vec<Brought> = links.all().par_iter().zip(spreads).map(brought).collect();
     let groups: Vec<Group> = links.all().par_iter().map(|link| Group::of(light, link.sender)).collect();
     let mut of_leaf: Vec<(u32, u32)> =
-        vertices.leaf.iter().copied().zip(0..).filter(|&(_, vertex)| !within.holds(vertex)).collect();
+        vertices.leaf.iter().copied().zip(0..).filter(|&(_, vertex)| gathers(vertex)).collect();
     of_leaf.par_sort_unstable();
     let above = Above { links, spreads, groups: &groups, carried: &carried };
     let found = inherit(
@@ -431,7 +444,8 @@ mod tests {
         let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         let mean = |solver: &Solver, links: &Links| {
-            let (vertices, _) = reconstruct(solver.light(), (links, None), 0.05, &mut |_| ControlFlow::Continue(()));
+            let (vertices, _) =
+                reconstruct(solver.light(), (links, None), (0.05, &|_| true), &mut |_| ControlFlow::Continue(()));
             vertices.irradiance.iter().map(|irradiance| irradiance.x).sum::<f32>() / vertices.irradiance.len() as f32
         };
         let right = mean(&solver, &solver.links);

@@ -8,7 +8,7 @@
 //! will be, and nothing is darker than it will be; what has no links at all because it was black or dark is refused.
 
 use crate::error::SolveError;
-use crate::hierarchy::{Elements, Kind};
+use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::reflect::Reflect;
 use crate::sent::Sent;
@@ -63,6 +63,12 @@ pub(crate) struct Linked {
 }
 
 impl<L: LightField> Solver<L> {
+    /// Geometry and rays, in unit space.
+    #[must_use]
+    pub fn scene(&self) -> &SceneData {
+        &self.scene
+    }
+
     /// The element hierarchy as it is now.
     #[must_use]
     pub fn elements(&self) -> &Elements {

@@ -47,7 +47,19 @@ pub struct Solution<L: LightField = ()> {
 impl<L: LightField> Solver<L> {
     /// Makes the solution ready for display: values at vertices. Where `watch` breaks, those that are left take the mean of
     /// the elements around them.
-    pub fn finish(mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Solution<L> {
+    pub fn finish(self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Solution<L> {
+        self.finish_seen(&|_| true, watch)
+    }
+
+    /// The same for pictures that show some leaves only: to find the irradiance of a vertex takes about as long as to solve for that
+    /// of a leaf. Vertices of no leaf that is `seen` take the mean of the elements around them
+    /// ([`unseen_vertices`](crate::stats::Skipped::unseen_vertices)); the others gather what they would in the whole, but for how far
+    /// the light of a region is made to agree with that of its leaves: leaves that are not seen have no say in it.
+    pub fn finish_seen(
+        mut self,
+        seen: &(dyn Fn(NodeId) -> bool + Sync),
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Solution<L> {
         let start = Instant::now();
         let faces = self.face_clusters();
         self.stats.skipped.joined_leaves = faces.joined(&self.elements);
@@ -69,7 +81,7 @@ impl<L: LightField> Solver<L> {
             self.reflected[leaf as usize] = exitant;
         }
         let places = Some(self.gather.places()).filter(|_| known && self.skips.inner_vertices);
-        let (vertices, cost) = reconstruct(self.light(), (&self.links, places), error, &mut |share| {
+        let (vertices, cost) = reconstruct(self.light(), (&self.links, places), (error, seen), &mut |share| {
             let answer =
                 watch(&Progress { phase: Phase::Reconstruct, fraction: 0.9 + 0.1 * share, error, links, nodes });
             stopped |= answer.is_break();
@@ -78,6 +90,7 @@ impl<L: LightField> Solver<L> {
         self.stats.stopped |= stopped;
         self.stats.vertex_rays += cost.rays;
         self.stats.skipped.inner_vertices = cost.within;
+        self.stats.skipped.unseen_vertices = cost.unseen;
         for (leaf, exitant) in curved {
             self.reflected[leaf as usize] = exitant;
         }
@@ -137,5 +150,60 @@ impl<L: LightField> Solution<L> {
         }
         path.reverse();
         path
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::skips::Skips;
+    use crate::skips::tests::solve;
+    use crate::{DiffuseMaterial, NodeId, Rgb, SceneInput, Shape, Surface};
+    use glam::DVec3;
+    use std::ops::ControlFlow;
+
+    /// A floor and a wall below a lamp, with a board on the floor, all black, so that all light is direct.
+    #[test]
+    fn vertices_that_are_seen_gather_the_same_alone() {
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let quad = |o: DVec3, a: DVec3, b: DVec3| Shape::Quad([o, o + a, o + a + b, o + b]);
+        let material = |reflectance, exitance| DiffuseMaterial {
+            reflectance: Rgb::splat(reflectance),
+            exitance: Rgb::splat(exitance),
+            two_sided: true,
+        };
+        let input = SceneInput {
+            surfaces: vec![
+                Surface::new(quad(DVec3::ZERO, x, y), 0),
+                Surface::new(quad(DVec3::ZERO, y, z), 0),
+                Surface::new(quad(x * 0.6, y * 0.5, z * 0.2), 0),
+                Surface::new(quad(DVec3::new(0.3, 0.3, 0.9), y * 0.3, x * 0.3), 1),
+            ],
+            // So little is reflected that nothing is made to agree with anything.
+            materials: vec![material(1e-6, 0.0), material(0.0, 1.0)],
+            ..SceneInput::default()
+        };
+        let finished = |seen: &(dyn Fn(NodeId, u32) -> bool + Sync)| {
+            let solver = solve(&input, 0.1, (), Skips::ALL);
+            let surfaces: Vec<u32> = solver.elements.nodes.iter().map(|element| element.source).collect();
+            solver.finish_seen(&|leaf| seen(leaf, surfaces[leaf.index()]), &mut |_| ControlFlow::Continue(()))
+        };
+        let (all, floor) = (finished(&|_, _| true), finished(&|_, surface| surface == 0));
+        let on_floor = |vertex: &usize| floor.light().element(floor.vertices.leaf[*vertex]).source == 0;
+        let (seen, unseen): (Vec<usize>, Vec<usize>) = (0..floor.vertices.positions.len()).partition(on_floor);
+        for &vertex in &seen {
+            let [a, b] = [&all, &floor].map(|solution| solution.vertices.irradiance[vertex]);
+            assert!((a - b).abs().max_element() <= 1e-4 * a.max_element(), "vertex {vertex}: {b}, not {a}");
+        }
+        for &vertex in &unseen {
+            let around = floor.vertices.leaves_around(vertex as u32);
+            let mean: Rgb = around.iter().map(|&leaf| floor.exitant.irradiance[leaf as usize]).sum::<Rgb>();
+            let (mean, light) = (mean / around.len() as f32, floor.vertices.irradiance[vertex]);
+            // Of what the board reflects, the lamp, which reflects nothing, keeps nothing.
+            let most = 1e-4 * mean.max_element() + 1e-6;
+            assert!((light - mean).abs().max_element() <= most, "{light} of elements with {mean}");
+        }
+        assert_eq!(all.stats.skipped.unseen_vertices, 0);
+        assert_eq!(floor.stats.skipped.unseen_vertices as usize, unseen.len(), "each of them is counted");
+        assert!(floor.stats.vertex_rays < all.stats.vertex_rays, "and shoots no ray");
     }
 }

@@ -13,7 +13,7 @@ use crate::progress::Progress;
 use crate::raycast::RayCaster;
 use crate::session;
 use crate::solution_file;
-use crate::solved::{Accuracy, Solved, Wanted};
+use crate::solved::{Accuracy, Purpose, Solved, Wanted};
 use crate::stats::{self, Times};
 use crate::window::WindowError;
 use hr_diffuse::{Budget, Phase, Settings};
@@ -78,6 +78,25 @@ impl Output {
             Self::Frames(_) | Self::Html(_) | Self::Export(_) | Self::Window => Mode::Distributions,
         }
     }
+
+    /// Where all of its pictures are taken from; `None` where that is not known before.
+    fn cameras(&self, scene: &Scene, args: &Args, path: &CameraPath) -> Option<Vec<Camera>> {
+        match self {
+            Self::Image(_) => Some(vec![scene.default_camera()]),
+            Self::Frames(_) => Some(walk(scene, args, path, FRAMES)),
+            Self::Html(_) | Self::Export(_) | Self::Window => None,
+        }
+    }
+}
+
+/// Cameras along the way of frames: of the size that the command line says, if it does.
+fn walk(scene: &Scene, args: &Args, path: &CameraPath, count: usize) -> Vec<Camera> {
+    if !path.is_empty() {
+        return path.cameras(count);
+    }
+    let [width, height] = FRAME_SIZE;
+    let cameras = scene.walkthrough(count).into_iter();
+    cameras.map(|camera| if args.camera.is_some() { camera } else { Camera { width, height, ..camera } }).collect()
 }
 
 /// Whether a file can be written there: its folder is one, and it is none itself.
@@ -148,8 +167,11 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
         Some(path) => solution_file::load(path, scene)?,
         None => {
             let begun = args.resume.as_deref().map(|path| solution_file::load(path, Arc::clone(&scene))).transpose()?;
-            // What is kept is for every mode.
-            solve(scene, begun, args, mode == Mode::Distributions || args.save.is_some(), &progress)?
+            // What is kept is for every mode, and for all who may look at it.
+            let cameras = output.cameras(&scene, args, &path).filter(|_| args.save.is_none());
+            let distributions = mode == Mode::Distributions || args.save.is_some();
+            let purpose = Purpose { distributions, cameras: cameras.as_deref() };
+            solve(scene, begun, args, purpose, &progress)?
         }
     };
     if let Some(path) = &args.save {
@@ -173,7 +195,7 @@ fn solve(
     scene: Arc<Scene>,
     begun: Option<(Solved, Accuracy)>,
     args: &Args,
-    distributions: bool,
+    purpose: Purpose<'_>,
     progress: &Progress,
 ) -> Result<(Solved, Accuracy), ViewError> {
     let interrupt = Interrupt::listen();
@@ -190,8 +212,8 @@ fn solve(
     let budget = Budget { time, ..Budget::default() };
     let settings = Settings { error: args.error, budget, transport: args.transport };
     Ok(match begun {
-        Some((solved, accuracy)) => solved.resumed(settings, distributions, accuracy, ask)?,
-        None => Solved::awaited(scene, settings, distributions, ask)?,
+        Some((solved, accuracy)) => solved.resumed(settings, purpose, accuracy, ask)?,
+        None => Solved::awaited(scene, settings, purpose, ask)?,
     })
 }
 
@@ -226,18 +248,11 @@ impl Show<'_> {
         make_folder(folder)?;
         let scene = &self.solved.scene;
         let caster = self.caster().with_grid(FRAME_GRID);
-        let resized = |mut camera: Camera, size: [u32; 2]| {
-            [camera.width, camera.height] = size;
-            camera
-        };
-        let walk = |count| if path.is_empty() { scene.walkthrough(count) } else { path.cameras(count) };
-        let exposure = metering::exposure(self.solved, self.mode, &walk(METERED));
+        let exposure = metering::exposure(self.solved, self.mode, &walk(scene, self.args, path, METERED));
         self.warn_if_black(exposure.is_none());
         let tone_map = ToneMap { exposure: Exposure::Factor(exposure.unwrap_or(1.0)), ..ToneMap::default() };
-        for (number, camera) in walk(FRAMES).into_iter().enumerate() {
+        for (number, camera) in walk(scene, self.args, path, FRAMES).into_iter().enumerate() {
             let watch = |share| self.progress.at("writing frames", (number as f32 + share) / FRAMES as f32);
-            let camera =
-                if self.args.camera.is_some() || !path.is_empty() { camera } else { resized(camera, FRAME_SIZE) };
             let film = caster.film(&camera, &watch);
             film.save(&folder.join(format!("frame-{number:04}.png")), &tone_map, scene.primaries)?;
         }

@@ -17,6 +17,7 @@ pub mod metering;
 pub mod path_tracer;
 pub mod progress;
 pub mod raycast;
+mod seen;
 mod session;
 pub mod solution_file;
 pub mod solved;

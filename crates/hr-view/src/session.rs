@@ -13,7 +13,7 @@ use crate::interrupt::{Interrupt, STOPPING};
 use crate::loading::load;
 use crate::progress::{Progress, activity};
 use crate::solution_file;
-use crate::solved::{Accuracy, Editable, Solved, Wanted};
+use crate::solved::{Accuracy, Editable, Purpose, Solved, Wanted};
 use crate::stats::{self, Times};
 use crate::walkthrough::Walkthrough;
 use crate::watched::Watched;
@@ -286,9 +286,10 @@ impl Session {
             wanted => wanted,
         };
         let distributions = wants_distributions && !is_sketch;
+        let purpose = Purpose { distributions, cameras: None };
         let found = match begun {
-            Some((solved, accuracy)) => solved.resumed(settings, distributions, accuracy, ask),
-            None if is_sketch => Solved::awaited(scene, settings, distributions, ask),
+            Some((solved, accuracy)) => solved.resumed(settings, purpose, accuracy, ask),
+            None if is_sketch => Solved::awaited(scene, settings, purpose, ask),
             None => Solved::editable(scene, settings, distributions, ask).map(|(solved, accuracy, kept)| {
                 editable = kept;
                 (solved, accuracy)

@@ -1,9 +1,10 @@
 //! From a scene to its solution.
 
+use crate::seen::seen;
 use glossy_ext::GlossyField;
 use glossy_ext::haar::Refinement;
 use hr_diffuse::{Phase, Progress, Settings, Solution, SolveError, Solver};
-use hr_scene::Scene;
+use hr_scene::{Camera, Scene};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -22,6 +23,21 @@ pub enum Wanted {
     Now,
     /// Nothing any more, as soon as may be.
     Nothing,
+}
+
+/// What a solution is to be ready for.
+#[derive(Clone, Copy, Debug)]
+pub struct Purpose<'a> {
+    /// Glossy leaves are shown by their distributions.
+    pub distributions: bool,
+    /// It is looked at from nowhere else; `None` for a walk that may lead anywhere.
+    pub cameras: Option<&'a [Camera]>,
+}
+
+impl Purpose<'_> {
+    fn anywhere(distributions: bool) -> Self {
+        Self { distributions, cameras: None }
+    }
 }
 
 /// How exact a solution is.
@@ -57,7 +73,7 @@ impl Solved {
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, SolveError> {
         let solver = solver(&scene, settings)?;
-        Ok(Self::by(scene, solver, distributions, watch))
+        Ok(Self::by(scene, solver, Purpose::anywhere(distributions), watch))
     }
 
     /// Goes on with what was solved before, to an error that may be smaller; the rest as for [`new`](Self::new).
@@ -71,30 +87,36 @@ impl Solved {
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, SolveError> {
         let solver = Solver::resume(self.solution, settings)?;
-        Ok(Self::by(self.scene, solver, distributions, watch))
+        Ok(Self::by(self.scene, solver, Purpose::anywhere(distributions), watch))
     }
 
     fn by(
         scene: Arc<Scene>,
         mut solver: Solver<GlossyField>,
-        distributions: bool,
+        purpose: Purpose<'_>,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Self {
         solver.solve(watch);
-        Self::shown(scene, solver, distributions, watch)
+        Self::shown(scene, solver, purpose, watch)
     }
 
     /// Makes what has been solved ready to be looked at.
     fn shown(
         scene: Arc<Scene>,
         mut solver: Solver<GlossyField>,
-        distributions: bool,
+        purpose: Purpose<'_>,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Self {
-        if distributions {
+        if purpose.distributions {
             solver.reflect_for_display(watch);
         }
-        let solution = solver.finish(watch);
+        let solution = match purpose.cameras {
+            Some(cameras) => {
+                let seen = seen(&scene, &solver, cameras);
+                solver.finish_seen(&|leaf| seen[leaf.index()], watch)
+            }
+            None => solver.finish(watch),
+        };
         Self { scene, solution }
     }
 
@@ -106,10 +128,13 @@ impl Solved {
     pub fn awaited(
         scene: Arc<Scene>,
         settings: Settings,
-        distributions: bool,
+        purpose: Purpose<'_>,
         ask: &mut dyn FnMut(&Progress) -> Wanted,
     ) -> Result<(Self, Accuracy), SolveError> {
-        Self::waiting(settings, 1.0, ask, |watch| Self::new(scene, settings, distributions, watch))
+        Self::waiting(settings, 1.0, ask, |watch| {
+            let solver = solver(&scene, settings)?;
+            Ok(Self::by(scene, solver, purpose, watch))
+        })
     }
 
     /// The same, and what takes over edits; nothing where it was stopped, or is too large to be kept twice.
@@ -130,7 +155,7 @@ impl Solved {
             if !stats.stopped && stats.spent.is_none() && stats.bytes <= MOST_KEPT {
                 editable = Some(Editable { scene: Arc::clone(&scene), solver: solver.clone() });
             }
-            Ok(Self::shown(scene, solver, distributions, watch))
+            Ok(Self::shown(scene, solver, Purpose::anywhere(distributions), watch))
         })?;
         Ok((solved, accuracy, editable))
     }
@@ -143,11 +168,14 @@ impl Solved {
     pub fn resumed(
         self,
         settings: Settings,
-        distributions: bool,
+        purpose: Purpose<'_>,
         accuracy: Accuracy,
         ask: &mut dyn FnMut(&Progress) -> Wanted,
     ) -> Result<(Self, Accuracy), SolveError> {
-        Self::waiting(settings, accuracy.believed, ask, |watch| self.resume(settings, distributions, watch))
+        Self::waiting(settings, accuracy.believed, ask, |watch| {
+            let solver = Solver::resume(self.solution, settings)?;
+            Ok(Self::by(self.scene, solver, purpose, watch))
+        })
     }
 
     fn waiting(
@@ -215,7 +243,7 @@ impl Editable {
         Solved::waiting(settings, 1.0, ask, |watch| {
             self.solver.relight(&scene.input(), field, watch)?;
             self.scene = Arc::clone(&scene);
-            Ok(Solved::shown(scene, self.solver.clone(), false, watch))
+            Ok(Solved::shown(scene, self.solver.clone(), Purpose::anywhere(false), watch))
         })
     }
 }

@@ -71,6 +71,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "steady_senders": skipped.steady_senders,
             "faint_links": skipped.faint_links,
             "inner_vertices": skipped.inner_vertices,
+            "unseen_vertices": skipped.unseen_vertices,
             "joined_leaves": skipped.joined_leaves,
             "shot_links": skipped.shot_links,
             "negligible_detail": solution.field.counters().negligible_detail(),
