@@ -461,8 +461,9 @@ impl Stats {
             steady_senders,
             faint_links,
             inner_vertices,
-            // As what is looked at has changed.
+            // Of the pictures that were taken, not of the solution.
             unseen_vertices: _,
+            unseen_leaves: _,
             joined_leaves,
             shot_links,
         } = skipped;

@@ -15,6 +15,7 @@ use crate::push::{Spread, spreads};
 use crate::rows::{self, Correction, Row, look_around};
 use crate::sampling::hash;
 use crate::segments::visibility_at;
+use crate::solution::Seen;
 use crate::threads::{self, prelude::*};
 use crate::transport::{Light, negligible};
 use crate::vertices::{Vertices, outlines, point_on};
@@ -40,9 +41,6 @@ const COVER: f32 = 0.25;
 const MOST_CHANGE: f64 = 1.5;
 /// Vertices that a thread gathers between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 128;
-
-/// Tells which leaves are seen.
-pub(crate) type Seen<'a> = &'a (dyn Fn(NodeId) -> bool + Sync);
 
 /// What the values at vertices took.
 #[derive(Clone, Copy, Debug, Default)]

@@ -12,8 +12,10 @@ use crate::links::Links;
 use crate::sampling::{hash, unit};
 use crate::sent::Sent;
 use crate::shooting::NEW_SHARE;
+use crate::solution::Seen;
 use crate::solver::{Phase, Progress, Solver};
 use crate::threads::{self, prelude::*};
+use crate::vertices::outlines;
 use crate::{Cone, Rgb};
 use glam::Vec2;
 use smallvec::SmallVec;
@@ -471,14 +473,23 @@ impl<L: LightField> Solver<L> {
     /// [`finish`](Self::finish) on; light goes on between elements by what stands for many. Where `watch` breaks, the rest is
     /// shown as it is.
     pub fn reflect_for_display(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        self.reflect_seen_for_display(&|_| true, watch);
+    }
+
+    /// The same for pictures that show some leaves only, as of [`finish_seen`](Self::finish_seen): others, but for those whose light the
+    /// vertices of `seen` ones have a share of, are shown as they send light ([`unseen_leaves`](crate::stats::Skipped::unseen_leaves)).
+    pub fn reflect_seen_for_display(&mut self, seen: Seen<'_>, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let start = Instant::now();
         let shown = SHOWN_SHARE * self.settings.error * self.mean_irradiance() * FRAC_1_PI;
         let negligible = if self.skips.negligible_detail { shown } else { 0.0 };
         let faces = self.face_clusters();
-        let counts = |leaf: &u32| self.elements.nodes[*leaf as usize].active && faces.standing(*leaf) == *leaf;
-        let leaves: Vec<Standing> = self
-            .elements
-            .patch_leaves()
+        let wanted = self.standing_for(seen, &faces);
+        let is_glossy = |leaf: u32| self.elements.nodes[leaf as usize].active && faces.standing(leaf) == leaf;
+        let glossy: Vec<u32> = self.elements.patch_leaves().filter(|&leaf| is_glossy(leaf)).collect();
+        let counts = |leaf: &u32| wanted[*leaf as usize];
+        self.stats.skipped.unseen_leaves = glossy.iter().filter(|leaf| !counts(leaf)).count() as u64;
+        let leaves: Vec<Standing> = glossy
+            .into_iter()
             .filter(counts)
             .map(|leaf| Standing { leaf, spread: self.bend(leaf).max(faces.spread(&self.elements, leaf)), negligible })
             .collect();
@@ -495,6 +506,35 @@ impl<L: LightField> Solver<L> {
         self.shown = leaves.into_iter().map(|standing| standing.leaf).zip(exitant).collect();
         self.stats.stopped |= stopped;
         self.stats.seconds.reflect += start.elapsed().as_secs_f64();
+    }
+
+    /// By node, whether it is a leaf of whose directional light the vertices of leaves that are seen have a share: it stands for one that
+    /// has a vertex with them, or next to those where several leaves have one for all.
+    fn standing_for(&self, seen: Seen<'_>, faces: &FaceClusters) -> Vec<bool> {
+        let nodes = self.elements.nodes.len();
+        let mut wanted: Vec<bool> = (0..nodes as u32).map(|node| seen(NodeId(node))).collect();
+        let is_leaf = |leaf: &u32| wanted[*leaf as usize];
+        if self.elements.patch_leaves().all(|leaf| is_leaf(&leaf)) {
+            return wanted;
+        }
+        let layout = outlines(&self.scene, &self.elements);
+        let rings = if faces.joined(&self.elements) > 0 { 2 } else { 1 };
+        for _ in 0..rings {
+            let mut at = vec![false; layout.vertices.positions.len()];
+            let parts = || layout.parts.iter().map(|(leaf, outline)| (*leaf as usize, outline));
+            for (_, outline) in parts().filter(|(leaf, _)| wanted[*leaf]) {
+                outline.iter().for_each(|corner| at[corner.vertex as usize] = true);
+            }
+            for (leaf, outline) in parts() {
+                wanted[leaf] |= outline.iter().any(|corner| at[corner.vertex as usize]);
+            }
+        }
+        for leaf in self.elements.patch_leaves() {
+            if wanted[leaf as usize] {
+                wanted[faces.standing(leaf) as usize] = true;
+            }
+        }
+        wanted
     }
 
     /// Angle by which the shading normals of a leaf's surface turn away from the surface: it is a piece of something

@@ -15,6 +15,9 @@ use crate::{Rgb, visibility::Hit};
 use glam::Vec2;
 use std::ops::ControlFlow;
 
+/// Tells which leaves pictures show.
+pub type Seen<'a> = &'a (dyn Fn(NodeId) -> bool + Sync);
+
 /// The light in a scene: hierarchy, links, exitant light per element and irradiance per vertex.
 #[derive(Debug)]
 pub struct Solution<L: LightField = ()> {
@@ -55,11 +58,7 @@ impl<L: LightField> Solver<L> {
     /// of a leaf. Vertices of no leaf that is `seen` take the mean of the elements around them
     /// ([`unseen_vertices`](crate::stats::Skipped::unseen_vertices)); the others gather what they would in the whole, but for how far
     /// the light of a region is made to agree with that of its leaves: leaves that are not seen have no say in it.
-    pub fn finish_seen(
-        mut self,
-        seen: &(dyn Fn(NodeId) -> bool + Sync),
-        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-    ) -> Solution<L> {
+    pub fn finish_seen(mut self, seen: Seen<'_>, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Solution<L> {
         let start = Instant::now();
         let faces = self.face_clusters();
         self.stats.skipped.joined_leaves = faces.joined(&self.elements);

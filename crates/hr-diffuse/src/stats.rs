@@ -75,6 +75,8 @@ pub struct Skipped {
     pub inner_vertices: u64,
     /// Vertices that gather nothing, as pictures do not show them.
     pub unseen_vertices: u64,
+    /// Leaves whose directional light is not made for display, as pictures do not show it.
+    pub unseen_leaves: u64,
     /// Leaves whose directional light is that of another one of their cluster.
     pub joined_leaves: u64,
     /// Links over which nothing was shot in an iteration, as their senders had next to no unshot light.
@@ -94,6 +96,7 @@ impl std::ops::AddAssign for Skipped {
         self.faint_links += other.faint_links;
         self.inner_vertices += other.inner_vertices;
         self.unseen_vertices += other.unseen_vertices;
+        self.unseen_leaves += other.unseen_leaves;
         self.joined_leaves += other.joined_leaves;
         self.shot_links += other.shot_links;
     }

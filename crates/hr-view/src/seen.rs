@@ -76,6 +76,8 @@ mod tests {
             let unseen = some.stats.skipped.unseen_vertices as usize;
             assert_eq!(all.stats.skipped.unseen_vertices, 0, "from anywhere all may be seen");
             assert!(2 * unseen > some.vertices.positions.len(), "{unseen} of {}", some.vertices.positions.len());
+            let leaves = some.stats.skipped.unseen_leaves;
+            assert_eq!(leaves > 100, mode == Mode::Distributions, "{mode:?}: {leaves} are not reflected");
             assert!(2 * some.stats.vertex_rays < all.stats.vertex_rays, "rays are saved");
             let light = |image: &Image| image.pixels.iter().map(|pixel| pixel.element_sum()).sum::<f32>();
             let apart = one.pixels.iter().zip(&other.pixels).map(|(a, b)| (*a - *b).abs().element_sum()).sum::<f32>();

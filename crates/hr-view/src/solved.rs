@@ -3,7 +3,7 @@
 use crate::seen::seen;
 use glossy_ext::GlossyField;
 use glossy_ext::haar::Refinement;
-use hr_diffuse::{Phase, Progress, Settings, Solution, SolveError, Solver};
+use hr_diffuse::{NodeId, Phase, Progress, Settings, Solution, SolveError, Solver};
 use hr_scene::{Camera, Scene};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -107,16 +107,12 @@ impl Solved {
         purpose: Purpose<'_>,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Self {
+        let seen = purpose.cameras.map(|cameras| seen(&scene, &solver, cameras));
+        let is_seen = |leaf: NodeId| seen.as_ref().is_none_or(|seen| seen[leaf.index()]);
         if purpose.distributions {
-            solver.reflect_for_display(watch);
+            solver.reflect_seen_for_display(&is_seen, watch);
         }
-        let solution = match purpose.cameras {
-            Some(cameras) => {
-                let seen = seen(&scene, &solver, cameras);
-                solver.finish_seen(&|leaf| seen[leaf.index()], watch)
-            }
-            None => solver.finish(watch),
-        };
+        let solution = solver.finish_seen(&is_seen, watch);
         Self { scene, solution }
     }
 

@@ -72,6 +72,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "faint_links": skipped.faint_links,
             "inner_vertices": skipped.inner_vertices,
             "unseen_vertices": skipped.unseen_vertices,
+            "unseen_leaves": skipped.unseen_leaves,
             "joined_leaves": skipped.joined_leaves,
             "shot_links": skipped.shot_links,
             "negligible_detail": solution.field.counters().negligible_detail(),
