@@ -30,21 +30,23 @@
 //! # Layout
 //! A *basis function* is one undivided triangle ([`Haar::basis_functions`]). At rest a distribution is an array of
 //! vertex values (three half floats relative to a scale of the whole distribution: 2⁻¹¹ relative precision, values
-//! below 2⁻²⁹ of the largest component are zero) and an array of 8-byte nodes: one for each divided triangle,
+//! below 2⁻²⁹ of the largest component are zero) and an array of nodes: one for each divided triangle,
 //! holding the vertices in the middle of its edges and where its children's nodes are, and one for each undivided
-//! triangle beside a finer one, holding the midpoints that it shares. Undivided triangles need no storage of their
-//! own and there is half a vertex to each, so that 6 to 8 bytes are used per basis function. The empty
-//! distribution, zero everywhere, allocates nothing.
+//! triangle beside a finer one, holding the midpoints that it shares. Nodes take as many bits as their indices need, in whole
+//! bytes: 4 or 5 in small distributions, 8 in the largest. Undivided triangles need no storage of their own and there is half
+//! a vertex to each, so that 5 to 7 bytes are used per basis function. The empty distribution, zero everywhere, allocates
+//! nothing.
 //!
 //! # Limits
 //! Magnitudes from 10⁻³⁰ to 10³⁷ are kept; what is larger may become 0, never infinite or not a number.
 //!
-//! Indices have 15 bits: a distribution has up to 24,576 vertices, about 49,000 basis functions (level 6 everywhere,
+//! Indices have up to 15 bits: a distribution has up to 24,576 vertices, about 49,000 basis functions (level 6 everywhere,
 //! or finer in parts). Refinement stops there, coarse levels first, and says so ([`Projected::truncated`]).
 
 mod combine;
 mod keep;
 mod mesh;
+mod nodes;
 mod outline;
 mod project;
 mod terms;
@@ -61,6 +63,7 @@ use crate::basis::half::{Half3, decode, encode, scale_for};
 use crate::basis::triangle::{ConeTest, Overlap, PIECE_SPLITS, Triangle, child_corners, midpoints};
 use glam::{DVec3, Vec3};
 use hr_diffuse::Cone;
+use nodes::{Layout, Node};
 
 /// Deepest level of subdivision: triangles 0.02° across. Positions stay exact and barycentric coordinates, which
 /// lose a bit per level, keep more than what half floats can show.
@@ -78,63 +81,9 @@ pub struct Haar {
     roots: u8,
     /// The corners of the octahedron (+x, −x, +y, −y, +z, −z) come first. Empty: zero everywhere.
     vertices: Box<[Half3]>,
-    nodes: Box<[Node]>,
-}
-
-/// From low to high bits: three vertex indices of 15 bits, the index of the first child's node of 15 bits, four bits
-/// that tell which children have a node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(transparent)]
-struct Node(u64);
-
-impl Node {
-    const NO_VERTEX: u16 = 0x7fff;
-
-    fn new(mids: [u16; 3], base: usize, mask: u64) -> Self {
-        let [a, b, c] = mids.map(u64::from);
-        Self(a | b << 15 | c << 30 | (base as u64 & 0x7fff) << 45 | mask << 60)
-    }
-
-    #[inline]
-    fn mids(self) -> [u16; 3] {
-        [0, 15, 30].map(|shift| (self.0 >> shift) as u16 & 0x7fff)
-    }
-
-    /// Whether this stands for four triangles rather than for an undivided one with some finer neighbours.
-    #[inline]
-    fn is_divided(self) -> bool {
-        self.mids().iter().all(|&m| m != Self::NO_VERTEX)
-    }
-
-    #[inline]
-    fn is_childless(self) -> bool {
-        self.0 >> 60 == 0
-    }
-
-    /// Index of the first child's node, where there is one.
-    #[inline]
-    fn base(self) -> usize {
-        (self.0 >> 45) as usize & 0x7fff
-    }
-
-    /// How many children have a node.
-    #[inline]
-    fn children(self) -> usize {
-        (self.0 >> 60).count_ones() as usize
-    }
-
-    /// Index of a child's node.
-    #[inline]
-    fn child(self, child: usize) -> Option<usize> {
-        let mask = (self.0 >> 60) as usize;
-        if mask >> child & 1 == 0 {
-            return None;
-        }
-        // How many of the up to three children before this one have a node: popcounts of 0…7, two bits each.
-        const COUNTS: usize = 0b11_10_10_01_10_01_01_00;
-        let before = mask & ((1 << child) - 1);
-        Some(self.base() + (COUNTS >> (2 * before) & 3))
-    }
+    layout: Layout,
+    /// As the layout says.
+    nodes: Box<[u8]>,
 }
 
 /// Face of the octahedron by its signs (bit 0: x < 0, bit 1: y < 0, bit 2: z < 0) → its corners.
@@ -152,6 +101,21 @@ struct Visit {
     level: u8,
 }
 
+impl Visit {
+    /// The parts of a divided triangle that has this node.
+    #[inline]
+    fn children(&self, node: Node) -> [Self; 4] {
+        let (triangles, mids) = (self.triangle.children(), node.mids());
+        let child = |child: usize| Self {
+            triangle: triangles[child],
+            vertices: child_corners(self.vertices, mids, child),
+            node: node.child(child),
+            level: self.level + 1,
+        };
+        [child(0), child(1), child(2), child(3)]
+    }
+}
+
 impl Haar {
     /// The corners of a face of the octahedron as vertex indices.
     #[inline]
@@ -164,6 +128,15 @@ impl Haar {
     fn root(&self, face: usize) -> Option<usize> {
         let roots = u32::from(self.roots);
         (roots >> face & 1 == 1).then(|| (roots & ((1 << face) - 1)).count_ones() as usize)
+    }
+
+    #[inline]
+    fn node(&self, index: usize) -> Node {
+        self.layout.node(&self.nodes, index)
+    }
+
+    fn all_nodes(&self) -> impl Iterator<Item = Node> {
+        (0..self.layout.count(&self.nodes).unwrap_or(0)).map(|index| self.node(index))
     }
 
     #[inline]
@@ -196,7 +169,7 @@ impl Haar {
         let mut corners = Self::face_vertices(negative);
         let mut node = self.root(negative);
         while let Some(index) = node {
-            let here = self.nodes[index];
+            let here = self.node(index);
             if here.is_childless() && !here.is_divided() {
                 let values = corners.map(|v| self.vertex(v));
                 let child = descend(&mut at);
@@ -219,27 +192,12 @@ impl Haar {
             return (Rgb::ZERO, Rgb::ZERO);
         }
         let test = ConeTest::new(cone);
-        let (mut low, mut high) = (Rgb::MAX, Rgb::MIN);
-        let (mut low_inside, mut high_inside) = (low, high);
-        let enter = &mut |visit: &Visit| match visit.triangle.overlap(&test) {
-            Overlap::Apart => false,
-            Overlap::Partial => true,
-            Overlap::Inside => {
-                self.vertices_below(visit.vertices, visit.node, &mut |v| {
-                    low_inside = low_inside.min(v);
-                    high_inside = high_inside.max(v);
-                });
-                false
-            }
-        };
-        let piece = &mut |triangle: &Triangle, values: [Rgb; 3]| {
-            triangle.bound(values, &test, PIECE_SPLITS, &mut low, &mut high);
-        };
+        let mut range = (Rgb::MAX, Rgb::MIN);
         match self.smallest_around(&test) {
-            Some(visit) => self.pieces_below(&visit, enter, piece),
-            None => self.pieces(enter, piece),
+            Some(visit) => self.bound_below(&visit, &test, &mut range),
+            None => self.faces().for_each(|visit| self.bound_below(&visit, &test, &mut range)),
         }
-        (low, high) = (low.min(low_inside), high.max(high_inside));
+        let (low, high) = range;
         if low.cmpgt(high).any() {
             // No cone at all: one of its numbers is not a number.
             return self.bounds(&Cone::SPHERE);
@@ -249,29 +207,50 @@ impl Haar {
         ((low - slack) * self.scale, (high + slack) * self.scale)
     }
 
+    /// Extends bounds by what a cone touches under a triangle. Pieces whose values are within them already are not looked at.
+    fn bound_below(&self, visit: &Visit, cone: &ConeTest, range: &mut (Rgb, Rgb)) {
+        let values = || visit.vertices.map(|v| self.vertex(v));
+        let bound = |triangle: &Triangle, values: [Rgb; 3], range: &mut (Rgb, Rgb)| {
+            triangle.bound(values, cone, PIECE_SPLITS, &mut range.0, &mut range.1);
+        };
+        let Some(index) = visit.node else { return bound(&visit.triangle, values(), range) };
+        match visit.triangle.overlap(cone) {
+            Overlap::Apart => (),
+            Overlap::Inside => self.vertices_below(visit.vertices, visit.node, &mut |v| {
+                *range = (range.0.min(v), range.1.max(v));
+            }),
+            Overlap::Partial => {
+                let node = self.node(index);
+                if node.is_divided() {
+                    visit.children(node).iter().for_each(|below| self.bound_below(below, cone, range));
+                } else {
+                    let corners = values();
+                    let mids = self.mid_values(corners, node);
+                    for (child, triangle) in visit.triangle.children().iter().enumerate() {
+                        bound(triangle, child_corners(corners, mids, child), range);
+                    }
+                }
+            }
+        }
+    }
+
     /// The smallest triangle that holds a whole cone, if any does: bounds over narrow cones start there.
     fn smallest_around(&self, cone: &ConeTest) -> Option<Visit> {
         let axis = cone.axis();
         let face = axis.cmplt(Vec3::ZERO).bitmask() as usize;
-        let mut around = Visit {
-            triangle: Triangle::new(face_corners(face)),
-            vertices: Self::face_vertices(face),
-            node: self.root(face),
-            level: 0,
-        };
+        let mut around = self.face(face);
         if !around.triangle.holds(cone) {
             return None;
         }
         let size = axis.abs();
         let mut at = size / size.element_sum();
-        while let Some(node) = around.node.map(|n| self.nodes[n]).filter(|n| n.is_divided()) {
+        while let Some(node) = around.node.map(|n| self.node(n)).filter(|n| n.is_divided()) {
             let child = descend(&mut at).index();
-            let triangle = around.triangle.child(child);
-            if !triangle.holds(cone) {
+            let below = around.children(node)[child];
+            if !below.triangle.holds(cone) {
                 break;
             }
-            let vertices = child_corners(around.vertices, node.mids(), child);
-            around = Visit { triangle, vertices, node: node.child(child), level: around.level + 1 };
+            around = below;
         }
         Some(around)
     }
@@ -308,12 +287,16 @@ impl Haar {
         if self.vertices.is_empty() {
             return;
         }
-        for face in 0..8 {
-            let triangle = Triangle::new(face_corners(face));
-            let vertices = Self::face_vertices(face);
-            let visit = Visit { triangle, vertices, node: self.root(face), level: 0 };
-            self.pieces_below(&visit, enter, piece);
-        }
+        self.faces().for_each(|visit| self.pieces_below(&visit, enter, piece));
+    }
+
+    fn face(&self, face: usize) -> Visit {
+        let triangle = Triangle::new(face_corners(face));
+        Visit { triangle, vertices: Self::face_vertices(face), node: self.root(face), level: 0 }
+    }
+
+    fn faces(&self) -> impl Iterator<Item = Visit> {
+        (0..8).map(|face| self.face(face))
     }
 
     fn pieces_below(
@@ -329,17 +312,9 @@ impl Haar {
         let Some(index) = visit.node else {
             return piece(&visit.triangle, values());
         };
-        let node = self.nodes[index];
+        let node = self.node(index);
         if node.is_divided() {
-            for (child, triangle) in visit.triangle.children().into_iter().enumerate() {
-                let below = Visit {
-                    triangle,
-                    vertices: child_corners(visit.vertices, node.mids(), child),
-                    node: node.child(child),
-                    level: visit.level + 1,
-                };
-                self.pieces_below(&below, enter, piece);
-            }
+            visit.children(node).iter().for_each(|below| self.pieces_below(below, enter, piece));
         } else {
             let corners = values();
             let mids = self.mid_values(corners, node);
@@ -355,7 +330,7 @@ impl Haar {
             visit(self.vertex(vertex));
         }
         if let Some(index) = node {
-            self.mids_below(self.nodes[index], visit);
+            self.mids_below(self.node(index), visit);
         }
     }
 
@@ -364,7 +339,7 @@ impl Haar {
             visit(self.vertex(mid));
         }
         for child in (0..4).filter_map(|child| node.child(child)) {
-            self.mids_below(self.nodes[child], visit);
+            self.mids_below(self.node(child), visit);
         }
     }
 
@@ -422,7 +397,7 @@ impl Haar {
         if self.is_empty() {
             return 0;
         }
-        8 + 3 * self.nodes.iter().filter(|node| node.is_divided()).count()
+        8 + 3 * self.all_nodes().filter(|node| node.is_divided()).count()
     }
 
     /// Level of the finest triangle; 0 for an octahedron.

@@ -48,6 +48,13 @@ impl ConeTest {
     pub(crate) fn axis(&self) -> Vec3 {
         self.axis
     }
+
+    /// Whether a direction, about as long as 1, is in a cone narrower than a hemisphere. Never wrongly true.
+    #[inline]
+    fn holds(&self, direction: Vec3) -> bool {
+        let along = direction.dot(self.axis) - Self::SLACK;
+        along > 0.0 && along * along > self.cos * self.cos * direction.length_squared()
+    }
 }
 
 /// How a triangle lies to a cone.
@@ -119,8 +126,14 @@ impl Triangle {
             let beyond = (-depth - ConeTest::SLACK).max(0.0);
             beyond * beyond > cone.sin * cone.sin * length2
         };
-        if cone.cos > 0.0 && (beyond(0) || beyond(1) || beyond(2)) {
-            return Overlap::Apart;
+        if cone.cos > 0.0 {
+            if beyond(0) || beyond(1) || beyond(2) {
+                return Overlap::Apart;
+            }
+            // It is convex, and holds all of what it holds the corners of.
+            if self.corners.iter().all(|&corner| cone.holds(corner)) {
+                return Overlap::Inside;
+            }
         }
         let between = self.center().dot(cone.axis);
         let cos = self.cos_radius();

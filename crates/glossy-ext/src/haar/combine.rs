@@ -1,8 +1,9 @@
 //! Sums and averages of distributions: pull (paper, section 3), and accumulation.
 
 use super::mesh::{Mesh, Midpoint, NO_VERTEX};
+use super::nodes::Node;
 use super::project::Variation;
-use super::{Haar, Node, Refinement};
+use super::{Haar, Refinement};
 use crate::Rgb;
 use crate::basis::triangle::{child_corners, midpoints};
 
@@ -55,7 +56,7 @@ fn union<'a>(distributions: impl IntoIterator<Item = (f32, &'a Haar)>) -> Mesh {
 
 /// Divides the mesh where the distribution is divided. What is there already is linear over what is divided now.
 fn cover(mesh: &mut Mesh, tri: u32, haar: &Haar, node: Option<usize>) {
-    let Some(node) = node.map(|n| haar.nodes[n]).filter(|n| n.is_divided()) else {
+    let Some(node) = node.map(|n| haar.node(n)).filter(|n| n.is_divided()) else {
         return;
     };
     if mesh.divide(tri, &mut |m: &Midpoint| m.between) {
@@ -72,7 +73,7 @@ fn deposit(mesh: &Mesh, tri: u32, haar: &Haar, node: Option<usize>, corners: [Rg
     for (vertex, value) in std::iter::zip(here.corners, corners) {
         own[usize::from(vertex)] = value;
     }
-    let node = node.map_or(Node::new([Node::NO_VERTEX; 3], 0, 0), |n| haar.nodes[n]);
+    let node = node.map_or(Node::NONE, |n| haar.node(n));
     let mids = haar.mid_values(corners, node);
     if here.is_divided() {
         for child in 0..4 {

@@ -4,7 +4,8 @@
 //! level exist, so what is coarser beside it is subdivided first. Neighbours are found by following indices; there
 //! is no search and no hashing.
 
-use super::{Haar, Node};
+use super::Haar;
+use super::nodes::{Fields, Layout, Node};
 use crate::Rgb;
 use crate::basis::half::{encode, scale_for};
 use crate::basis::triangle::{EDGE_ENDS, Triangle, child_corners, midpoints};
@@ -249,16 +250,17 @@ impl Mesh {
         while next < order.len() {
             let tri = &self.tris[order[next] as usize];
             let base = order.len();
-            let mut mask = 0;
+            let mut mask = 0_u8;
             if tri.is_divided() {
                 order.extend(with_node(tri.children..tri.children + 4));
                 mask = order[base..].iter().fold(0, |mask, &t| mask | 1 << (t - tri.children));
             }
-            nodes.push(Node::new(tri.mids, base, mask));
+            nodes.push(Fields { mask, mids: tri.mids, base: if mask == 0 { 0 } else { base } });
             next += 1;
         }
         let vertices = self.values.iter().map(|&v| encode(finite(v), scale)).collect();
-        Haar { scale, roots, vertices, nodes: nodes.into_boxed_slice() }
+        let layout = Layout::new(self.values.len(), nodes.len());
+        Haar { scale, roots, vertices, layout, nodes: layout.pack(&nodes) }
     }
 }
 

@@ -1,6 +1,7 @@
 //! A distribution taken apart, for files and for other programs that show it.
 
-use super::{Haar, Node};
+use super::Haar;
+use super::nodes::Node;
 use crate::Rgb;
 use crate::basis::triangle::{EDGE_ENDS, child_corners};
 
@@ -41,7 +42,7 @@ impl Haar {
             met[usize::from(corner)] = corner;
             outline.values.push(value(corner));
         }
-        let divided = |node: Option<usize>| node.map(|n| self.nodes[n]).filter(|n| n.is_divided());
+        let divided = |node: Option<usize>| node.map(|n| self.node(n)).filter(|n| n.is_divided());
         let mut triangles: Vec<(Node, [u16; 3])> = Vec::new();
         for face in 0..8 {
             if let Some(node) = divided(self.root(face)) {
