@@ -1,5 +1,5 @@
 //! The tables and figures of the paper's comparisons, made anew: Stamminger et al., "Efficient Glossy Global Illumination
-//! with Interactive Viewing", Computer Graphics Forum 19(1), 2000, tables 1 to 4 and figures 4, 7.
+//! with Interactive Viewing", Computer Graphics Forum 19(1), 2000, tables 1 to 4 and figures 4, 7 and 8.
 //!
 //! Times are processor seconds of one thread, of all that is compared in the same process, one beside the other.
 

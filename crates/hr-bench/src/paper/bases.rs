@@ -1,4 +1,5 @@
-//! Table 2 and figure 7: the adaptive Haar basis against the non-adaptive one, and spherical harmonics.
+//! Table 2, figures 7 and 8: the adaptive Haar basis against the non-adaptive one and spherical harmonics, and the relative
+//! refiner against the absolute one.
 
 use super::leaves::{Leaf, distance, glossy_leaves, reflect, solve};
 use super::{Page, percent, relative};
@@ -23,7 +24,12 @@ const ERROR: f32 = 0.1;
 /// Levels of the non-adaptive basis.
 const LEVELS: [u8; 4] = [3, 4, 5, 6];
 /// ε and last level of our refiner, ever finer: at each level the ε beyond which a smaller one brings little.
-const FINER: [(f32, u8); 8] = [(0.2, 3), (0.2, 4), (0.2, 5), (0.1, 5), (0.07, 5), (0.05, 5), (0.02, 5), (0.02, 6)];
+const FINER: [(f32, u8); 9] =
+    [(0.2, 2), (0.2, 3), (0.2, 4), (0.2, 5), (0.1, 5), (0.07, 5), (0.05, 5), (0.02, 5), (0.02, 6)];
+/// ε and levels of figure 8.
+const RELATIVE: (f32, [u8; 2]) = (0.5, [1, 5]);
+/// Steps of the search for a threshold.
+const STEPS: u32 = 20;
 /// Error that the solver is asked for to show the solution.
 const SHOWN_ERROR: f32 = 0.05;
 /// Width of the pictures, pixels.
@@ -68,6 +74,19 @@ impl Subject<'_> {
     fn haar(&self) -> Vec<Made> {
         FINER.map(|(epsilon, level)| self.made::<Haar>(refinement(epsilon, level))).to_vec()
     }
+
+    /// The absolute refiner that makes about as many functions, between the same levels.
+    fn as_many_as(&self, functions: usize, settings: Refinement) -> Refinement {
+        let absolute = |threshold| Refinement { refiner: Refiner::Absolute(threshold), ..settings };
+        // Radiances (W/(m² sr)), more and less than what differs anywhere.
+        let (mut low, mut high) = (1e-3_f32, 1e3_f32);
+        for _ in 0..STEPS {
+            let middle = (low * high).sqrt();
+            let is_finer = self.made::<Haar>(absolute(middle)).functions > functions;
+            (low, high) = if is_finer { (middle, high) } else { (low, middle) };
+        }
+        absolute(high)
+    }
 }
 
 /// Our refiner.
@@ -88,7 +107,7 @@ pub(super) fn report(page: &mut Page<'_>) -> Result<(), BenchError> {
     let solution = solve(&scene.input(), &reflectors, ERROR)?;
     let leaves = glossy_leaves(&solution, 1);
     let subject = Subject { solution: &solution, reflectors: &reflectors, leaves, attempts: 3 };
-    page.text("## Table 2 and figure 7: the Haar basis against the non-adaptive one");
+    page.text("## Table 2, figures 7 and 8: the Haar basis against the non-adaptive one");
     page.text(&format!(
         "An empty room with a glossy floor: what its {} leaves reflect, in several bases. All of them keep vertex values \
          as half floats, spherical harmonics their coefficients as floats. The paper, for 2,878 distributions by Radiance \
@@ -138,6 +157,10 @@ pub(super) fn report(page: &mut Page<'_>) -> Result<(), BenchError> {
         ]);
     }
     page.text(
+        "At level 3 triangles are wider than the highlights, so that neither basis has them: where nothing is resolved, an \
+         adaptive one saves little.",
+    );
+    page.text(
         "Above non-adaptive, in the middle Haar by the paper's refiner, left to level 3, right to level 4; below left Haar by \
          our refiner, as `hr-view` uses it, right a final gather:",
     );
@@ -153,7 +176,31 @@ pub(super) fn report(page: &mut Page<'_>) -> Result<(), BenchError> {
             shown::<Haar>(&scene, Refinement::default(), Mode::Gather)?,
         ],
     ];
-    page.picture("figure-7", "The glossy floor in both bases", &side_by_side(&pictures))
+    page.picture("figure-7", "The glossy floor in both bases", &side_by_side(&pictures))?;
+    refiners(&subject, &scene, page)
+}
+
+/// Adds figure 8.
+fn refiners(subject: &Subject<'_>, scene: &Arc<Scene>, page: &mut Page<'_>) -> Result<(), BenchError> {
+    let (epsilon, levels) = RELATIVE;
+    let settings = relative(epsilon, levels);
+    let made = subject.made::<Haar>(settings);
+    let absolute = subject.as_many_as(made.functions, settings);
+    let other = subject.made::<Haar>(absolute);
+    page.text(&format!(
+        "Figure 8, levels {}/{}: left the relative refiner, ε = {epsilon} ({} functions for the leaves above, error {}), right the \
+         absolute one with the threshold that makes as many ({}, error {}). Both divide down to the last level where the lobes \
+         of strong samples point, whatever differs there, so that little is left to show the paper's ringing:",
+        levels[0],
+        levels[1],
+        made.functions,
+        percent(made.error),
+        other.functions,
+        percent(other.error),
+    ));
+    let shows = Mode::Distributions;
+    let pictures = [vec![shown::<Haar>(scene, settings, shows)?, shown::<Haar>(scene, absolute, shows)?]];
+    page.picture("figure-8", "The glossy floor by both refiners", &side_by_side(&pictures))
 }
 
 /// A picture of the scene with its distributions in some basis.
@@ -177,7 +224,7 @@ fn view(scene: &Scene) -> Result<Camera, BenchError> {
 mod tests {
     use super::*;
 
-    /// Where highlights are represented at all, the adaptive basis needs half of the memory at most, and fewer
+    /// Where highlights are represented at all, the adaptive basis needs half of the memory at most, and half of the
     /// evaluations.
     #[test]
     fn haar_is_smaller_and_evaluates_less_at_equal_error() {
@@ -188,12 +235,12 @@ mod tests {
         let subject = Subject { solution: &solution, reflectors: &reflectors, leaves, attempts: 3 };
         let (even, haar) = (subject.non_adaptive(), subject.haar());
         assert!(even[0].error > 0.3, "level 3 misses highlights: {:?}", even[0]);
-        for (level, made) in LEVELS.iter().zip(&even).skip(2) {
+        for (level, made) in LEVELS.iter().zip(&even).skip(1) {
             let memory = share(&haar, made, |m| m.bytes as f64).expect("within the range");
             // Times would be spoilt by other tests beside this one.
             let work = share(&haar, made, |m| m.evaluations as f64).expect("within the range");
             assert!(memory <= 0.5, "level {level}: {memory} of the memory");
-            assert!(work <= 0.8, "level {level}: {work} of the evaluations");
+            assert!(work <= 0.5, "level {level}: {work} of the evaluations");
         }
     }
 }
