@@ -96,7 +96,7 @@ pub(super) fn report(page: &mut Page<'_>) -> Result<(), BenchError> {
          reflector makes of all samples together is projected once. *Summing*: what it makes of each sample is projected, \
          and the distributions are added up. The paper does not tell how wide its highlights are: here are three. Lights at the \
          reflector's horizon are left out (of 30°, the outer columns). In brackets: the paper's ratios. With its refiner they \
-         are reached at α = 0.3 and 0.4; narrower lobes stand apart from each other, and separate peaks need as many functions \
+         are reached at α = 0.4 and nearly at 0.3; narrower lobes stand apart from each other, and separate peaks need as many functions \
          in the sum as by themselves.",
     );
     let columns = [
