@@ -11,12 +11,15 @@ use crate::reflector::{Incident, Reflector, Ward};
 use crate::samples::{IlluminationSample, Place, SampleSet, arriving_as, merge_close, merge_weak};
 use albedos::Albedos;
 use glam::Vec3;
+use hr_diffuse::hooks::TYPICAL_LOBE;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
 use std::cell::Cell;
 use std::f32::consts::FRAC_PI_2;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
+/// Direction for which a lobe is typical: 37° off the normal.
+const TYPICAL: Vec3 = Vec3::new(0.6, 0.0, 0.8);
 /// In light transport lobes are at least as wide as this makes them (standard deviation in radians, about 1.7°):
 /// what distributions of level 6 resolve. Narrower ones are followed by rays at display.
 const NARROWEST: f32 = 0.03;
@@ -63,6 +66,8 @@ struct Material {
     mirror: Option<Ward>,
     /// What is reflected beside the diffuse part.
     albedo: Rgb,
+    /// Width of its lobe (radians).
+    width: f32,
     /// The same by direction, for those that any light reaches.
     albedos: OnceLock<Albedos>,
 }
@@ -147,6 +152,8 @@ pub struct GlossyField<B: Basis = Haar> {
     /// `None`: the material is diffuse.
     materials: Vec<Option<Material>>,
     settings: B::Settings,
+    /// Whether what the host says of errors and of what is negligible makes no difference.
+    alone: bool,
     counters: Counters,
 }
 
@@ -178,12 +185,20 @@ impl<B: Basis> GlossyField<B> {
                         .then(|| Ward::new(Rgb::ZERO, mirror, MIRROR_ALPHA).ok())
                         .flatten(),
                     albedo,
+                    width: reflector.lobe(TYPICAL).width,
                     albedos: OnceLock::new(),
                 }
             })
         });
         let materials = materials.collect();
-        Self { materials, settings, counters }
+        Self { materials, settings, alone: false, counters }
+    }
+
+    /// Refines distributions by their settings alone, whatever the host says of errors and of what is negligible: independently of space, to
+    /// be compared with. The light is the same; it takes several times the memory.
+    #[must_use]
+    pub fn refined_alone(self) -> Self {
+        Self { alone: true, ..self }
     }
 
     /// Work done so far.
@@ -207,8 +222,9 @@ impl<B: Basis> GlossyField<B> {
         arrived: Arrived,
     ) -> Option<Reflection<'_>> {
         let material = self.material(hierarchy.material(leaf))?;
+        let arrived = if self.alone { Arrived { negligible: 0.0, error: 1.0, ..arrived } } else { arrived };
         let (center, normals) = (hierarchy.center(leaf), hierarchy.normals(leaf));
-        let width = material.reflector.lobe(Vec3::new(0.6, 0.0, 0.8)).width;
+        let width = material.width;
         // Normals that turn by an angle turn what is reflected by twice as much.
         let narrowest = (2.0 * arrived.spread).clamp(NARROWEST, FRAC_PI_2);
         // A lobe that is not round is narrower one way; a mirror shows everything.
@@ -475,6 +491,13 @@ impl<B: Basis> LightField for GlossyField<B> {
 
     fn active(&self, material: u32) -> Option<Rgb> {
         self.material(Some(material)).map(|m| m.albedo)
+    }
+
+    /// Of lobes narrower than light transport resolves nothing is told: they are followed by rays at display, and finer links would show
+    /// nowhere.
+    fn lobe_width(&self, material: u32) -> Option<f32> {
+        let width = self.material(Some(material))?.width;
+        Some(if width < NARROWEST { TYPICAL_LOBE } else { width })
     }
 
     fn incident_bytes(&self, incident: &SampleSet) -> usize {

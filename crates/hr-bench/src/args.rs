@@ -40,6 +40,8 @@ pub enum Command {
     Visibility(VisibilityArgs),
     /// The paper's tables 1 to 4 and figures 4 and 7, made anew: a Markdown page with pictures
     Paper(PaperArgs),
+    /// Memory over the error that distributions show, directions refined by themselves and together with space: Markdown tables
+    Together(TogetherArgs),
     /// Time of frames along a walk, over the share of glossy vertices and the tolerance of their renewal: Markdown tables
     View(ViewArgs),
     /// The pictures of the guide in docs/, made anew
@@ -286,6 +288,22 @@ pub struct PaperArgs {
     /// Where paper-tables.md and its pictures go
     #[arg(long, value_name = "DIR", default_value = "target/hr-bench")]
     pub out: PathBuf,
+}
+
+/// Of `hr-bench together`.
+#[derive(Clone, Debug, PartialEq, Args)]
+pub struct TogetherArgs {
+    /// Scenes of the references, files or names of built-in ones; all that are glossy where none is given
+    #[arg(value_name = "SCENE")]
+    pub scenes: Vec<String>,
+
+    /// Errors to ask for
+    #[arg(long, value_name = "E", value_delimiter = ',', default_values_t = [0.2, 0.1, 0.05, 0.02])]
+    pub error: Vec<f32>,
+
+    /// Folder of references (references.json, views/NAME.npy)
+    #[arg(long, value_name = "DIR")]
+    pub reference: PathBuf,
 }
 
 /// Of `hr-bench guide`.

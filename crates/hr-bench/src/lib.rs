@@ -39,6 +39,7 @@ pub mod plot;
 pub mod run;
 mod side_by_side;
 pub mod threads;
+pub mod together;
 pub mod transport;
 pub mod views;
 pub mod visibility;

@@ -5,7 +5,7 @@ use crate::compare::{compare, luminance};
 use crate::views::{Making, listed, path_traced};
 use crate::{
     BenchError, accuracy, bounds, curve, edits, float_image, form_factors, frames, growth, guide, paper, pictures,
-    threads, transport, visibility,
+    threads, together, transport, visibility,
 };
 use hr_scene::{Camera, ImageKind, Scene, ToneMap, builtin};
 use hr_view::path_tracer::{self, PathTracer};
@@ -35,6 +35,7 @@ pub fn run(cli: &Cli, out: Out<'_>) -> Result<(), BenchError> {
         Command::Bounds(args) => bounds::report(args, out),
         Command::Visibility(args) => measure_visibility(args, out),
         Command::Paper(args) => paper::report(args, out),
+        Command::Together(args) => together::report(args, out),
         Command::View(args) => frames::report(args, out),
         Command::Guide(args) => guide::pictures(args, out),
         Command::Pictures(args) => pictures::report(args, out),

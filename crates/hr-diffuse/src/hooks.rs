@@ -6,7 +6,8 @@
 //!
 //! # What is called when
 //!
-//! [`active`](LightField::active) once per material, before anything else; its answer never changes. Then, in each
+//! [`active`](LightField::active) once per material, before anything else, and [`lobe_width`](LightField::lobe_width) before links
+//! are refined; their answers never change. Then, in each
 //! iteration, in this order:
 //!
 //! | step | call | on | writes | reads |
@@ -167,7 +168,8 @@ pub struct Arrived {
     /// Differences of the leaf's exitant light by less than this, W/(m² sr), make no difference to what is asked for: 0
     /// where everything counts.
     pub negligible: f32,
-    /// The relative error asked for, 0…1. What is merged or interpolated may be wrong by about as much.
+    /// The relative error that the leaf's exitant light may have, 0…1: what was asked for, or what it has anyhow, as links are no finer.
+    /// What is merged or interpolated may be wrong by about as much.
     pub error: f32,
     /// Whether the leaf is only looked at, with each place's own normal, and sends no light on: then a curved one reflects what its
     /// middle does not see, too.
@@ -194,6 +196,9 @@ impl Arrived {
     }
 }
 
+/// Width (radians) of the lobes of an extension that does not say what it is.
+pub const TYPICAL_LOBE: f32 = 0.4;
+
 /// Whether light is finite and not negative.
 fn is_light(light: Rgb) -> bool {
     light.is_finite() && light.min_element() >= 0.0
@@ -210,6 +215,11 @@ pub trait LightField: Sync {
     /// where they do not take part. Nodes without any active surface below them are never visited. An engine may
     /// carry the light of materials that reflect next to nothing this way as diffuse light until it is shown.
     fn active(&self, material: u32) -> Option<Rgb>;
+    /// Width of the lobe that surfaces of this material reflect light in, as the standard deviation per axis in radians, so that links
+    /// to them need be no finer than it can tell; `None` where they do not take part.
+    fn lobe_width(&self, material: u32) -> Option<f32> {
+        self.active(material).map(|_| TYPICAL_LOBE)
+    }
     /// Forgets a node's incident light, before links carry light anew.
     fn clear(&self, incident: &mut Self::Incident);
     /// Takes one link's light at its receiver, which may be a leaf, an inner element or a cluster.

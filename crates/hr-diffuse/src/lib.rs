@@ -36,6 +36,7 @@ pub mod keep;
 mod kept_weights;
 mod leaf_rows;
 pub mod links;
+mod lobes;
 mod moved;
 pub mod oracle;
 mod places;

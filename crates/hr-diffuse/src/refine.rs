@@ -13,6 +13,7 @@ use crate::geometry::Domain;
 use crate::hierarchy::{Element, Elements, Kind};
 use crate::hooks::LightField;
 use crate::links::Link;
+use crate::lobes::Shares;
 use crate::oracle::{FactorBounds, factor_bounds};
 use crate::proofs;
 use crate::rooms::are_apart;
@@ -29,12 +30,7 @@ use smallvec::{SmallVec, smallvec};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Share of the oracle's interval that counts as error where it stems from geometry: the transported value is an
-/// average over the interval, and display renews the geometry per vertex.
-const GEOMETRY_SHARE: f32 = 0.12;
-/// The same for receivers that reflect directional light, which shows where light comes from.
-const GLOSSY_GEOMETRY_SHARE: f32 = 0.25;
-/// The same where it stems from the sender's uneven radiosity.
+/// Share of the oracle's interval that counts as error where it stems from the sender's uneven radiosity.
 const RADIOSITY_SHARE: f32 = 0.5;
 /// The same where it stems from the sender's directional distribution: of the directions that lead to a receiver few
 /// see the peak of a narrow lobe.
@@ -179,6 +175,7 @@ pub(crate) fn refine<L: LightField>(
         .collect();
     wave.extend(unlit.into_iter().map(|pair| Candidate { pair, link: None }));
     let counters = Counters::default();
+    let shares = Shares::new(light.elements, light.scene.materials.len(), light.field);
     while !wave.is_empty() {
         refined.pairs += wave.len() as u64;
         let reader = light.read();
@@ -192,7 +189,7 @@ pub(crate) fn refine<L: LightField>(
             let stopped = refined.stopped || refined.spent.is_some();
             let decided = part.par_iter().with_min_len(32).map(|candidate| {
                 let inherited = if stopped { inherited(reader, candidate) } else { None };
-                let decided = || decide(reader, candidate, tolerance, stopped, &counters);
+                let decided = || decide(reader, candidate, (tolerance, &shares), stopped, &counters);
                 let keep = |link| if candidate.own().is_some() { Verdict::Keep(link) } else { Verdict::Inherit(link) };
                 inherited.map_or_else(decided, keep)
             });
@@ -363,8 +360,13 @@ impl Interval {
     }
 }
 
-/// The interval of a pair. Directional light below `negligible` is not looked at closely.
-fn interval<L: LightField>(light: Light<'_, L>, pair: Pair, bounds: &FactorBounds, negligible: f32) -> Interval {
+/// The interval of a pair, with the share of its geometry that counts. Directional light below `negligible` is not looked at closely.
+fn interval<L: LightField>(
+    light: Light<'_, L>,
+    pair: Pair,
+    bounds: &FactorBounds,
+    (negligible, share): (f32, f32),
+) -> Interval {
     let sender = pair.sender;
     let [least, most] = light.diffuse_range(sender);
     let (factor, spread) = (0.5 * (bounds.max + bounds.min), (most - least).max_element());
@@ -375,7 +377,6 @@ fn interval<L: LightField>(light: Light<'_, L>, pair: Pair, bounds: &FactorBound
         (least, most + peak)
     };
     let typical = (0.5 * (least + most)).max(light.emitted(sender, bounds.from_sender.axis)).max_element();
-    let share = if light.element(pair.receiver).active { GLOSSY_GEOMETRY_SHARE } else { GEOMETRY_SHARE };
     Interval {
         most: high.max_element() * bounds.max,
         geometry: share * typical * (bounds.max - bounds.min),
@@ -387,7 +388,7 @@ fn interval<L: LightField>(light: Light<'_, L>, pair: Pair, bounds: &FactorBound
 fn decide<L: LightField>(
     light: Light<'_, L>,
     candidate: &Candidate,
-    tolerance: Tolerance,
+    (tolerance, shares): (Tolerance, &Shares),
     stopped: bool,
     counters: &Counters,
 ) -> Verdict {
@@ -415,7 +416,8 @@ fn decide<L: LightField>(
         return Verdict::Facing;
     };
     let weight = light.weight(pair.receiver);
-    let interval = interval(light, pair, &bounds, tolerance.error / weight);
+    let share = shares.of(pair.receiver, r.material);
+    let interval = interval(light, pair, &bounds, (tolerance.error / weight, share));
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
     let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);

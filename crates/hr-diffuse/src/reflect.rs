@@ -13,7 +13,7 @@ use crate::sampling::{hash, unit};
 use crate::sent::Sent;
 use crate::shooting::NEW_SHARE;
 use crate::solution::Seen;
-use crate::solver::{Phase, Progress, Solver};
+use crate::solver::{Phase, Progress, Solver, Transport};
 use crate::threads::{self, prelude::*};
 use crate::vertices::outlines;
 use crate::{Cone, Rgb};
@@ -41,6 +41,9 @@ const LEAST_VISIBILITY: f32 = 0.1;
 /// What differs by less than this share of the error asked for, times the mean radiance of diffuse white, is negligible where
 /// leaves themselves are looked at.
 const SHOWN_SHARE: f32 = 0.5;
+/// What a distribution that is shown may be wrong by, relative to itself: at least this, or the error asked for where that is less; and at
+/// most half, or highlights would lose their outline.
+const SHOWN_ERROR: [f32; 2] = [0.1, 0.5];
 /// A leaf is reflected anew where so much less of its light is negligible than when it was reflected.
 const FINER: f32 = 0.5;
 
@@ -160,7 +163,7 @@ impl Senders {
 
     /// All leaves that stand for something, in order, each with the angle within which the normals are for which it
     /// stands, its own among them: the least where it stands for several nodes.
-    fn leaves(&self, elements: &Elements, faces: &FaceClusters) -> Vec<Standing> {
+    fn leaves(&self, elements: &Elements, faces: &FaceClusters, error: f32) -> Vec<Standing> {
         let mut leaves: Vec<Standing> = Vec::with_capacity(self.standing.len());
         for (node, element) in elements.nodes.iter().enumerate() {
             let standing = self.of(node as u32);
@@ -172,6 +175,7 @@ impl Senders {
                 leaf,
                 spread: spread.max(faces.spread(elements, leaf)),
                 negligible: 0.0,
+                error,
             }));
         }
         leaves.sort_unstable_by(|a, b| a.leaf.cmp(&b.leaf).then(a.spread.total_cmp(&b.spread)));
@@ -187,6 +191,8 @@ struct Standing {
     spread: f32,
     /// As in [`Arrived`].
     negligible: f32,
+    /// As in [`Arrived`].
+    error: f32,
 }
 
 /// A few of many, in proportion to the area that they stand for.
@@ -288,7 +294,7 @@ impl<L: LightField> Solver<L> {
         let mut senders = Senders::new((elements, &faces), &self.links, lit, |leaf| {
             faint[elements.nodes[leaf as usize].material as usize] == Rgb::ZERO
         });
-        let mut leaves = senders.leaves(elements, &faces);
+        let mut leaves = senders.leaves(elements, &faces, self.settings.error);
         if self.skips.negligible_detail {
             self.weigh(&senders, new.is_some(), &mut leaves);
         }
@@ -438,8 +444,8 @@ impl<L: LightField> Solver<L> {
         shown: bool,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Vec<L::Exitant> {
-        let (elements, error, light) = (&self.elements, self.settings.error, self.light());
-        let reflect = |&Standing { leaf, spread, negligible }: &Standing| {
+        let (elements, light) = (&self.elements, self.light());
+        let reflect = |&Standing { leaf, spread, negligible, error }: &Standing| {
             let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
             let mut node = leaf;
             while node != 0 {
@@ -482,6 +488,7 @@ impl<L: LightField> Solver<L> {
         let start = Instant::now();
         let shown = SHOWN_SHARE * self.settings.error * self.mean_irradiance() * FRAC_1_PI;
         let negligible = if self.skips.negligible_detail { shown } else { 0.0 };
+        let errors = self.skips.negligible_detail.then(|| self.link_errors());
         let faces = self.face_clusters();
         let wanted = self.standing_for(seen, &faces);
         let is_glossy = |leaf: u32| self.elements.nodes[leaf as usize].active && faces.standing(leaf) == leaf;
@@ -491,7 +498,14 @@ impl<L: LightField> Solver<L> {
         let leaves: Vec<Standing> = glossy
             .into_iter()
             .filter(counts)
-            .map(|leaf| Standing { leaf, spread: self.bend(leaf).max(faces.spread(&self.elements, leaf)), negligible })
+            .map(|leaf| Standing {
+                leaf,
+                spread: self.bend(leaf).max(faces.spread(&self.elements, leaf)),
+                negligible,
+                error: errors
+                    .as_ref()
+                    .map_or(self.settings.error, |errors| self.shown_error(leaf, errors[leaf as usize])),
+            })
             .collect();
         let progress = self.progress(Phase::Transport, 0.9);
         let (mut done, mut stopped) = (0, false);
@@ -535,6 +549,30 @@ impl<L: LightField> Solver<L> {
             }
         }
         wanted
+    }
+
+    /// By node, what the irradiance there may be wrong by, as links in space are no finer: those on it and on all above it, each by what
+    /// its tolerance lets it be, or by all that it carries, and each on its own.
+    fn link_errors(&self) -> Vec<f32> {
+        let is_known = self.gather.is_for(&self.links) && self.settings.transport == Transport::Gather;
+        let arriving = if is_known { self.gather.arriving() } else { &[] };
+        let tolerance = self.link_error(self.unfinished.tolerance.min(1.0));
+        let mut squares = vec![0.0_f32; self.elements.nodes.len()];
+        for (node, element) in self.elements.nodes.iter().enumerate() {
+            let most = tolerance / self.weight(node as u32).max(f32::MIN_POSITIVE);
+            let carried = |link: usize| arriving.get(link).map_or(f32::INFINITY, |light| light.max_element());
+            let own: f32 = self.links.range(node as u32).map(|link| carried(link).min(most).powi(2)).sum();
+            squares[node] = own + if node > 0 { squares[element.parent as usize] } else { 0.0 };
+        }
+        squares.into_iter().map(f32::sqrt).collect()
+    }
+
+    /// What a distribution that is shown may be wrong by, relative to itself, where the leaf's irradiance may be wrong by so much: to tell
+    /// directions apart more finely than space would take memory and show nothing.
+    fn shown_error(&self, leaf: u32, by_links: f32) -> f32 {
+        let irradiance = self.exitant.irradiance[leaf as usize].max_element().max(f32::MIN_POSITIVE);
+        let [least, most] = SHOWN_ERROR;
+        (by_links / irradiance).clamp(least.min(self.settings.error), most)
     }
 
     /// Angle by which the shading normals of a leaf's surface turn away from the surface: it is a piece of something

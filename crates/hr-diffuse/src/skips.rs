@@ -21,7 +21,7 @@ pub(crate) struct Skips {
     pub(crate) inner_vertices: bool,
     /// Directional light of each leaf of a cluster whose leaves reflect alike.
     pub(crate) face_clusters: bool,
-    /// Directional detail that makes no difference to what links carry.
+    /// Directional detail that makes no difference to what links carry, or that is finer than what they bring to a leaf that is shown.
     pub(crate) negligible_detail: bool,
 }
 

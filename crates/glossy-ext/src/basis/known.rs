@@ -54,8 +54,8 @@ pub struct Known<'a> {
     pub finest: f32,
     /// What differs by no more than this, in the unit of the function, is not refined. Bases that do not adapt take no notice.
     pub negligible: f32,
-    /// Interpolation is to be as exact as this, relative to the function, where the settings are less strict. Bases that do not
-    /// adapt take no notice.
+    /// Interpolation is to be as exact as this, relative to the function, and no more; from 1 on, as exact as the settings say. Bases that
+    /// do not adapt take no notice.
     pub error: f32,
 }
 

@@ -74,13 +74,13 @@ impl Refinement {
         Self { min_level: 1, max_level: 5, refiner: Refiner::Relative(0.5), negligible: 0.0, preserve_energy: false };
 
     /// Whether a triangle must be subdivided. `center` includes the offset; `largest` is the largest component met
-    /// so far, `error` how exact interpolation is to be at least.
+    /// so far, `error` how exact interpolation is to be.
     pub(super) fn is_rough(&self, variation: &Variation, center: Rgb, largest: f32, error: f32) -> bool {
         let size = self.size(center, largest);
         let spread = self.spread(variation);
         match self.refiner {
             Refiner::Relative(epsilon) => spread > epsilon * size,
-            Refiner::Interpolation(epsilon) => spread > epsilon.min(error) * size,
+            Refiner::Interpolation(epsilon) => spread > interpolated(epsilon, error) * size,
             Refiner::Absolute(threshold) => spread > threshold,
         }
     }
@@ -89,7 +89,7 @@ impl Refinement {
     pub(super) fn allowed(&self, center: Rgb, largest: f32, error: f32) -> f32 {
         match self.refiner {
             Refiner::Relative(_) | Refiner::Absolute(_) => 0.0,
-            Refiner::Interpolation(epsilon) => epsilon.min(error) * self.size(center, largest),
+            Refiner::Interpolation(epsilon) => interpolated(epsilon, error) * self.size(center, largest),
         }
     }
 
@@ -105,6 +105,11 @@ impl Refinement {
             Refiner::Interpolation(_) => variation.deviation,
         }
     }
+}
+
+/// What interpolation may be wrong by, relative to the function: what is known of that, or else what the refiner says.
+fn interpolated(epsilon: f32, error: f32) -> f32 {
+    if error < 1.0 { error } else { epsilon }
 }
 
 /// How a function varies over a triangle, as far as is known.

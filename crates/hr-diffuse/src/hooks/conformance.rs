@@ -349,6 +349,10 @@ impl<L: LightField> LightField for Watched<L> {
         self.field.active(material)
     }
 
+    fn lobe_width(&self, material: u32) -> Option<f32> {
+        self.field.lobe_width(material)
+    }
+
     fn clear(&self, incident: &mut Self::Incident) {
         incident.transfers.clear();
         self.field.clear(&mut incident.incident);
