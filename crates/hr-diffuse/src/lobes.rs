@@ -3,8 +3,9 @@
 //! What a link carries is a mean over where its light may come from. A diffuse receiver adds up all that arrives, and next to nothing is
 //! seen of that; a narrow lobe shows the sender itself. So the wider a receiver's lobe, the more of the oracle's interval is lost in it.
 
+use crate::Rgb;
 use crate::hierarchy::Elements;
-use crate::hooks::LightField;
+use crate::hooks::{LightField, TYPICAL_LOBE};
 
 /// Share of the oracle's interval that counts as error where it stems from geometry, for diffuse receivers: the transported value is
 /// an average over the interval, and display renews the geometry per vertex.
@@ -23,8 +24,13 @@ pub(crate) struct Shares {
 }
 
 impl Shares {
-    pub(crate) fn new<L: LightField>(elements: &Elements, materials: usize, field: &L) -> Self {
-        let by_material: Vec<f32> = (0..materials as u32).map(|m| share(field.lobe_width(m))).collect();
+    /// Of materials with `faint` lobes, whose light travels as diffuse light, little shows where it comes from, however sharp they are.
+    pub(crate) fn new<L: LightField>(elements: &Elements, faint: &[Rgb], field: &L) -> Self {
+        let width = |(material, faint): (u32, &Rgb)| {
+            let width = field.lobe_width(material);
+            if *faint == Rgb::ZERO { width } else { width.map(|width| width.max(TYPICAL_LOBE)) }
+        };
+        let by_material: Vec<f32> = (0..).zip(faint).map(|material| share(width(material))).collect();
         let nodes = &elements.nodes;
         let mut by_node = vec![DIFFUSE; nodes.len()];
         for node in (1..nodes.len()).rev() {

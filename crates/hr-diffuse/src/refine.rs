@@ -175,7 +175,7 @@ pub(crate) fn refine<L: LightField>(
         .collect();
     wave.extend(unlit.into_iter().map(|pair| Candidate { pair, link: None }));
     let counters = Counters::default();
-    let shares = Shares::new(light.elements, light.scene.materials.len(), light.field);
+    let shares = Shares::new(light.elements, light.faint, light.field);
     while !wave.is_empty() {
         refined.pairs += wave.len() as u64;
         let reader = light.read();
