@@ -3,12 +3,12 @@
 //! Rows of form factors (see [`leaf_rows`](crate::leaf_rows)) say how much is seen, not how bright it is: what is bright is
 //! seen by chance a little too much or too little, all over a region alike, and each bounce repeats it. Rays from all over a
 //! region know the mean, whatever the links. Few rays tell the mean of much, and little of a part; so each part is taken to be
-//! as the whole that it belongs to, as far as its own rays do not know better. Of narrow lobes rays would miss the peaks:
-//! directional light is left out on both sides.
+//! as the whole that it belongs to, as far as its own rays do not know better. Of narrow lobes few rays see the peaks: places that
+//! are lit by much directional light are left out.
 
 use crate::hierarchy::Elements;
 use crate::hooks::LightField;
-use crate::residual::diffuse_along;
+use crate::residual::reflected_along;
 use crate::sampling::{cosine_direction, hash, point4, unit};
 use crate::segments::receiving_point;
 use crate::threads::{self, prelude::*};
@@ -75,8 +75,7 @@ impl Sums {
     }
 }
 
-/// Factors for reflected light, in the order of the places in `brought`, each with what links bring of diffusely reflected light
-/// (sum of channels); from so many rays, and how many were shot. `None` where `watch` breaks.
+/// Factors for reflected light, in the order of the places in `brought`, each with what links bring of it (sum of channels); from so many rays, and how many were shot. `None` where `watch` breaks.
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
     brought: &[(u32, f32)],
@@ -118,7 +117,7 @@ pub(crate) fn calibrate<L: LightField>(
             let u = point4(seed, ray);
             let on = (unit(hash(hash(seed, 0x53), ray)), Vec2::new(u.z, u.w));
             let Some((x, n, surface)) = receiving_point(light, place, on) else { continue };
-            let found = diffuse_along(light, x, cosine_direction(n, u.x, u.y), surface);
+            let found = reflected_along(light, x, cosine_direction(n, u.x, u.y), surface);
             sums.add(&Sums::of(each * f64::from(found), each * f64::from(brought)));
         }
         sums
@@ -183,11 +182,17 @@ pub(crate) fn factors(elements: &Elements, found: impl Iterator<Item = (u32, Sum
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::skips::tests::Echo;
     use crate::{DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solver, Surface};
     use glam::DVec3;
 
     /// A cube whose ceiling shines, with walls of which so much is reflected, solved.
     fn room(reflectance: f32) -> Solver {
+        room_with(reflectance, ())
+    }
+
+    /// The same with an extension.
+    fn room_with<L: LightField>(reflectance: f32, field: L) -> Solver<L> {
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
         let quad =
             |o: DVec3, a: DVec3, b: DVec3, material| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), material);
@@ -203,7 +208,7 @@ mod tests {
             quad(y, x, z, 0),
         ];
         let input = SceneInput { surfaces, materials: vec![wall, lamp], ..SceneInput::default() };
-        let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
+        let mut solver = Solver::new(&input, Settings::with_error(0.05), field).expect("the room is sound");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         solver
     }
@@ -255,6 +260,21 @@ mod tests {
         }
         assert!(factors[0] > 1.03, "something is missing: {}", factors[0]);
         assert!((after / before - factors[0]).abs() < 1e-6, "{}, not {}", after / before, factors[0]);
+    }
+
+    /// An extension's light is compared, too.
+    #[test]
+    fn nothing_changes_where_nothing_is_missing() {
+        let solver = room_with(0.5, Echo { material: 0, albedo: 0.05, errs: false });
+        let (light, brought) = (solver.light(), solver.gather.reflected(solver.light(), &solver.links));
+        let (factors, _) =
+            calibrate(light, &brought, 200_000, &mut || ControlFlow::Continue(())).expect("nobody breaks");
+        let sum = |of: &dyn Fn(usize) -> f32| {
+            let weight = |(i, &(leaf, _)): (usize, &(u32, f32))| light.element(leaf).area * of(i);
+            brought.iter().enumerate().map(weight).sum::<f32>()
+        };
+        let mean = sum(&|i| factors[i] * brought[i].1) / sum(&|i| brought[i].1);
+        assert!((mean - 1.0).abs() < 0.02, "{mean}");
     }
 
     #[test]

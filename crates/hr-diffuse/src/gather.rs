@@ -129,8 +129,8 @@ impl Gather {
         gather
     }
 
-    /// Compares what arrives of diffusely reflected light with what rays find, so many for each place that reflects any light, and
-    /// makes it so; returns the number of rays.
+    /// Compares what arrives of reflected light with what rays find, so many for each place that reflects any light, and makes it so;
+    /// returns the number of rays.
     pub(crate) fn calibrate<L: LightField>(
         &mut self,
         light: Light<'_, L>,
@@ -138,17 +138,17 @@ impl Gather {
         rays_each: usize,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> u64 {
-        let mut brought = self.diffuse(light, links);
+        let mut brought = self.reflected(light, links);
         if light.element(0).active {
-            // Places have one weight for all that a link carries: where lobes make it, it tells nothing of what is diffuse.
-            for ((_, diffuse), all) in brought.iter_mut().zip(self.reflected(light, links)) {
-                *diffuse = if *diffuse >= MOSTLY_DIFFUSE * all { *diffuse } else { 0.0 };
+            // Where lobes make much of what arrives few rays see their peaks.
+            for ((_, brought), (_, diffuse)) in brought.iter_mut().zip(self.diffuse(light, links)) {
+                *brought = if diffuse >= MOSTLY_DIFFUSE * *brought { *brought } else { 0.0 };
             }
         }
         let places = self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count();
         let Some((factors, rays)) = calibrate(light, &brought, rays_each * places, watch) else { return 0 };
-        for ((row, factor), (_, diffuse)) in self.rows.iter_mut().zip(factors).zip(brought) {
-            if diffuse > 0.0 {
+        for ((row, factor), (_, brought)) in self.rows.iter_mut().zip(factors).zip(brought) {
+            if brought > 0.0 {
                 row[Group::Rest as usize] *= factor;
                 row[Group::Faint as usize] *= factor;
             }
@@ -169,12 +169,13 @@ impl Gather {
         on_leaves.into_iter().map(|(leaf, indirect)| (leaf, indirect.max(0.0))).collect()
     }
 
-    /// The same by place.
-    fn reflected<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<f32> {
+    /// By place, what arrives there of light that has been reflected (sum of channels).
+    pub(crate) fn reflected<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
         let shares = light.reflected_shares();
-        self.by_place(light, links, |link, spread| {
+        let reflected = self.by_place(light, links, |link, spread| {
             carried(light, link, spread).element_sum() * shares[link.sender as usize]
-        })
+        });
+        self.push.places.nodes.iter().copied().zip(reflected).collect()
     }
 
     /// By place, what arrives there of light that has been reflected diffusely (sum of channels).

@@ -314,8 +314,7 @@ fn reflected<L: LightField>(light: Light<'_, L>, leaf: u32, seed: u32) -> f32 {
         let (x, n) = point(light, leaf, Vec2::new(u.z, u.w));
         let direction = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + Vec2::new(u.x, u.y)) / GRID as f32;
         let direction = cosine_direction(n, direction.x, direction.y);
-        let Some(sender) = seen_along(light, x, direction, surface) else { continue };
-        sum += (light.emitted(sender, -direction) - own_light(light, sender)).max(Rgb::ZERO).element_sum();
+        sum += reflected_along(light, x, direction, surface);
     }
     sum / (GRID * GRID) as f32
 }
@@ -335,11 +334,11 @@ fn own_light<L: LightField>(light: Light<'_, L>, leaf: u32) -> Rgb {
     }
 }
 
-/// Light that has been reflected diffusely toward a point of a surface (π times its radiance, sum of channels) by what a ray in a
-/// direction meets.
-pub(crate) fn diffuse_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> f32 {
-    let diffuse = |sender: u32| light.exitant.radiosity[sender as usize] - own_light(light, sender);
-    seen_along(light, x, direction, surface).map_or(0.0, |sender| diffuse(sender).max(Rgb::ZERO).element_sum())
+/// Light that has been reflected toward a point of a surface (π times its radiance, sum of channels) by what a ray in a direction
+/// meets.
+pub(crate) fn reflected_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> f32 {
+    let reflected = |sender: u32| light.emitted(sender, -direction) - own_light(light, sender);
+    seen_along(light, x, direction, surface).map_or(0.0, |sender| reflected(sender).max(Rgb::ZERO).element_sum())
 }
 
 #[cfg(test)]

@@ -394,7 +394,8 @@ impl<L: LightField> Light<'_, L> {
     /// By node, the share of its diffuse light that has been reflected; the rest is emitted.
     pub(crate) fn reflected_shares(&self) -> Vec<f32> {
         let share = |(node, emitted): (usize, f32)| {
-            let power = self.exitant.radiosity[node].element_sum() * self.elements.nodes[node].area;
+            let light = self.exitant.radiosity[node] + self.exitant.directional[node];
+            let power = light.element_sum() * self.elements.nodes[node].area;
             if power > 0.0 { (1.0 - emitted / power).clamp(0.0, 1.0) } else { 0.0 }
         };
         self.emitted_power().into_iter().enumerate().map(share).collect()
@@ -410,6 +411,7 @@ impl<L: LightField> Light<'_, L> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::skips::tests::Echo;
     use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
     use glam::DVec3;
     use std::ops::ControlFlow;
@@ -494,5 +496,23 @@ mod tests {
         let (emitted, arrived) = (power(&solver.exitant.radiosity, true), power(&solver.exitant.irradiance, false));
         // A third of the error asked for.
         assert!((arrived / emitted - 1.0).abs() < 0.03, "{arrived} of {emitted} arrive");
+    }
+
+    /// Metal reflects nothing diffusely, and yet all that it sends has been reflected.
+    #[test]
+    fn what_only_an_extension_reflects_is_reflected_light() {
+        let mut surfaces = cuboid(DVec3::ZERO, DVec3::ONE, true, 0);
+        surfaces.extend(cuboid(DVec3::splat(0.4), DVec3::splat(0.6), false, 1));
+        let metal = DiffuseMaterial { reflectance: Rgb::ZERO, exitance: Rgb::ZERO, two_sided: false };
+        let lamp = DiffuseMaterial { exitance: Rgb::ONE, ..metal };
+        let input = SceneInput { surfaces, materials: vec![metal, lamp], ..SceneInput::default() };
+        let field = Echo { material: 0, albedo: 0.5, errs: false };
+        let mut solver = Solver::new(&input, Settings::with_error(0.3), field).expect("the scene is sound");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        let shares = solver.light().reflected_shares();
+        for leaf in solver.elements.patch_leaves() {
+            let is_metal = solver.elements.nodes[leaf as usize].material == 0;
+            assert_eq!(shares[leaf as usize], f32::from(u8::from(is_metal)), "of leaf {leaf}");
+        }
     }
 }
