@@ -485,28 +485,52 @@ impl<L: LightField> Solver<L> {
     /// The same for pictures that show some leaves only, as of [`finish_seen`](Self::finish_seen): others, but for those whose light the
     /// vertices of `seen` ones have a share of, are shown as they send light ([`unseen_leaves`](crate::stats::Skipped::unseen_leaves)).
     pub fn reflect_seen_for_display(&mut self, seen: Seen<'_>, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
-        let start = Instant::now();
-        let shown = SHOWN_SHARE * self.settings.error * self.mean_irradiance() * FRAC_1_PI;
-        let negligible = if self.skips.negligible_detail { shown } else { 0.0 };
-        let errors = self.skips.negligible_detail.then(|| self.link_errors());
         let faces = self.face_clusters();
         let wanted = self.standing_for(seen, &faces);
         let is_glossy = |leaf: u32| self.elements.nodes[leaf as usize].active && faces.standing(leaf) == leaf;
         let glossy: Vec<u32> = self.elements.patch_leaves().filter(|&leaf| is_glossy(leaf)).collect();
-        let counts = |leaf: &u32| wanted[*leaf as usize];
-        self.stats.skipped.unseen_leaves = glossy.iter().filter(|leaf| !counts(leaf)).count() as u64;
-        let leaves: Vec<Standing> = glossy
-            .into_iter()
-            .filter(counts)
-            .map(|leaf| Standing {
-                leaf,
-                spread: self.bend(leaf).max(faces.spread(&self.elements, leaf)),
-                negligible,
-                error: errors
-                    .as_ref()
-                    .map_or(self.settings.error, |errors| self.shown_error(leaf, errors[leaf as usize])),
-            })
-            .collect();
+        let count = glossy.len();
+        let leaves: Vec<u32> = glossy.into_iter().filter(|&leaf| wanted[leaf as usize]).collect();
+        self.stats.skipped.unseen_leaves = (count - leaves.len()) as u64;
+        self.shown.clear();
+        self.reflect_closely(&leaves, &faces, watch);
+    }
+
+    /// The same for flat leaves that stand for senders and are not shown so yet: vertices near by see more of their lobes than links tell
+    /// from afar. A metal box is a few leaves, each of which throws its own image of a lamp onto the floor. To be called before
+    /// [`finish`](Self::finish), where pictures are worth it.
+    pub fn reflect_flat_senders(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        let mut wanted = vec![false; self.elements.nodes.len()];
+        self.exitant.senders.standing.iter().for_each(|standing| wanted[standing.leaf as usize] = true);
+        self.shown.iter().for_each(|(leaf, _)| wanted[*leaf as usize] = false);
+        let is_wanted = |leaf: &u32| {
+            let element = &self.elements.nodes[*leaf as usize];
+            // Curved ones send more blurred than they are shown.
+            let is_flat = element.is_flat() && self.scene.shading_normals[element.source as usize].is_none();
+            wanted[*leaf as usize] && is_flat
+        };
+        let leaves: Vec<u32> = self.elements.patch_leaves().filter(is_wanted).collect();
+        self.reflect_closely(&leaves, &self.face_clusters(), watch);
+    }
+
+    /// Reflects the incident light of leaves as closely as they are looked at.
+    fn reflect_closely(
+        &mut self,
+        leaves: &[u32],
+        faces: &FaceClusters,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) {
+        let start = Instant::now();
+        let shown = SHOWN_SHARE * self.settings.error * self.mean_irradiance() * FRAC_1_PI;
+        let negligible = if self.skips.negligible_detail { shown } else { 0.0 };
+        let errors = self.skips.negligible_detail.then(|| self.link_errors());
+        let standing = |&leaf: &u32| {
+            let spread = self.bend(leaf).max(faces.spread(&self.elements, leaf));
+            let error =
+                errors.as_ref().map_or(self.settings.error, |errors| self.shown_error(leaf, errors[leaf as usize]));
+            Standing { leaf, spread, negligible, error }
+        };
+        let leaves: Vec<Standing> = leaves.iter().map(standing).collect();
         let progress = self.progress(Phase::Transport, 0.9);
         let (mut done, mut stopped) = (0, false);
         let chunk = BETWEEN_WATCHES * threads::current_num_threads();
@@ -517,7 +541,7 @@ impl<L: LightField> Solver<L> {
             stopped |= answer.is_break();
             answer
         });
-        self.shown = leaves.into_iter().map(|standing| standing.leaf).zip(exitant).collect();
+        self.shown.extend(leaves.into_iter().map(|standing| standing.leaf).zip(exitant));
         self.stats.stopped |= stopped;
         self.stats.seconds.reflect += start.elapsed().as_secs_f64();
     }
@@ -590,6 +614,10 @@ impl<L: LightField> Solver<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::hooks::{Hierarchy, Transfer};
+    use crate::skips::Skips;
+    use crate::skips::tests::{room, solve};
+    use glam::Vec3;
 
     const LIT: Representative = Representative { leaf: 0, share: 0.5, strength: Rgb::ONE };
 
@@ -617,5 +645,53 @@ mod tests {
         for now in [vec![other], vec![more], vec![LIT, other], vec![]] {
             assert_eq!(compared(&now, &[LIT]), Sends::Else, "{now:?}");
         }
+    }
+
+    /// Remembers whether it was reflected as closely as leaves are looked at.
+    struct Looked;
+
+    impl LightField for Looked {
+        type Incident = ();
+        type Exitant = bool;
+
+        fn active(&self, _: u32) -> Option<Rgb> {
+            Some(Rgb::splat(0.4))
+        }
+        fn clear(&self, (): &mut ()) {}
+        fn receive(&self, (): &mut (), _: &Transfer) {}
+        fn reflect<H: Hierarchy>(&self, _: &H, _: NodeId, _: &[&()], arrived: Arrived) -> bool {
+            arrived.shown
+        }
+        fn radiance(&self, _: &bool, _: Vec3) -> Rgb {
+            Rgb::splat(0.1)
+        }
+        fn radiance_bounds(&self, _: &bool, _: &Cone) -> (Rgb, Rgb) {
+            (Rgb::splat(0.1), Rgb::splat(0.1))
+        }
+    }
+
+    /// Vertices see flat senders as closely as eyes do, each reflected once.
+    #[test]
+    fn flat_senders_are_looked_at_closely() {
+        let finished = |looks: bool| {
+            let mut solver = solve(&room(), 0.2, Looked, Skips::ALL);
+            let go_on = &mut |_: &Progress| ControlFlow::Continue(());
+            if looks {
+                solver.reflect_flat_senders(go_on);
+                let found = solver.shown.len();
+                solver.reflect_flat_senders(go_on);
+                assert_eq!(solver.shown.len(), found, "they are shown already");
+            }
+            let solution = solver.finish(go_on);
+            let leaf = |standing: &Representative| standing.leaf;
+            let senders: Vec<u32> = solution.exitant.senders.standing.iter().map(leaf).collect();
+            let is_flat = |leaf: u32| solution.light().element(leaf).is_flat();
+            let flat: Vec<u32> = senders.into_iter().filter(|&leaf| is_flat(leaf)).collect();
+            let close = flat.iter().filter(|&&leaf| solution.reflected[leaf as usize]).count();
+            (close, flat.len())
+        };
+        let (close, all) = finished(true);
+        assert!(all > 10 && close == all, "{close} of {all}");
+        assert_eq!(finished(false).0, 0, "nobody asked for it");
     }
 }

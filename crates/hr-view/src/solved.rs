@@ -112,6 +112,7 @@ impl Solved {
         if purpose.distributions {
             solver.reflect_seen_for_display(&is_seen, watch);
         }
+        solver.reflect_flat_senders(watch);
         let solution = solver.finish_seen(&is_seen, watch);
         Self { scene, solution }
     }
