@@ -131,7 +131,7 @@ pub(crate) fn reconstruct<L: LightField>(
         }
     }
     agree(light, &mut vertices, &indirect, seen);
-    uncover(&mut vertices, &covered);
+    uncover(&mut vertices, &covered, &is_seen);
     within.fill(&light.exitant.irradiance, &mut vertices);
     let unseen = is_seen.iter().filter(|&&is_seen| !is_seen).count() as u64;
     (vertices, Cost { rays, within: within.count(), unseen })
@@ -177,8 +177,9 @@ fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, gathered: 
 }
 
 /// Nobody sees the darkness behind a picture on a wall or below a cupboard, but interpolation would carry it to where it
-/// is seen: vertices there take the mean irradiance of the others around.
-fn uncover(vertices: &mut Vertices, covered: &[bool]) {
+/// is seen: vertices there take the mean irradiance of the others around, but for those that nobody sees, which may be dark, too.
+fn uncover(vertices: &mut Vertices, covered: &[bool], is_seen: &[bool]) {
+    let is_lit = |vertex: u32| !covered[vertex as usize] && is_seen[vertex as usize];
     let mut lit: Vec<(u32, Rgb)> = Vec::new();
     for vertex in (0..covered.len() as u32).filter(|&vertex| covered[vertex as usize]) {
         let (mut sum, mut count) = (Rgb::ZERO, 0.0);
@@ -187,7 +188,7 @@ fn uncover(vertices: &mut Vertices, covered: &[bool]) {
                 .fans(leaf)
                 .filter(|fan| fan.iter().any(|corner| corner.vertex == vertex))
                 .flatten()
-                .filter(|corner| !covered[corner.vertex as usize])
+                .filter(|corner| is_lit(corner.vertex))
             {
                 sum += vertices.irradiance[corner.vertex as usize];
                 count += 1.0;
