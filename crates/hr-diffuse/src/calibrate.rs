@@ -75,7 +75,8 @@ impl Sums {
     }
 }
 
-/// Factors for reflected light, in the order of the places in `brought`, each with what links bring of it (sum of channels); from so many rays, and how many were shot. `None` where `watch` breaks.
+/// Factors for reflected light, in the order of the places in `brought`, each with what links bring of it (sum of channels); from so
+/// many rays, and how many were shot. `None` where `watch` breaks.
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
     brought: &[(u32, f32)],
