@@ -38,7 +38,7 @@ pub enum Command {
     Bounds(BoundsArgs),
     /// Rays per second on one thread, and links that need none: Markdown tables
     Visibility(VisibilityArgs),
-    /// The paper's tables 1 to 4 and figures 4 and 7, made anew: a Markdown page with pictures
+    /// The paper's tables 1 to 4 and figures 4, 7 and 8, made anew: a Markdown page with pictures
     Paper(PaperArgs),
     /// Memory over the error that distributions show, directions refined by themselves and together with space: Markdown tables
     Together(TogetherArgs),

@@ -485,6 +485,10 @@ impl<L: LightField> Solver<L> {
     /// The same for pictures that show some leaves only, as of [`finish_seen`](Self::finish_seen): others, but for those whose light the
     /// vertices of `seen` ones have a share of, are shown as they send light ([`unseen_leaves`](crate::stats::Skipped::unseen_leaves)).
     pub fn reflect_seen_for_display(&mut self, seen: Seen<'_>, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        self.shown.clear();
+        if !self.elements.nodes[0].active {
+            return;
+        }
         let faces = self.face_clusters();
         let wanted = self.standing_for(seen, &faces);
         let is_glossy = |leaf: u32| self.elements.nodes[leaf as usize].active && faces.standing(leaf) == leaf;
@@ -492,7 +496,6 @@ impl<L: LightField> Solver<L> {
         let count = glossy.len();
         let leaves: Vec<u32> = glossy.into_iter().filter(|&leaf| wanted[leaf as usize]).collect();
         self.stats.skipped.unseen_leaves = (count - leaves.len()) as u64;
-        self.shown.clear();
         self.reflect_closely(&leaves, &faces, watch);
     }
 
@@ -500,6 +503,9 @@ impl<L: LightField> Solver<L> {
     /// from afar. A metal box is a few leaves, each of which throws its own image of a lamp onto the floor. To be called before
     /// [`finish`](Self::finish), where pictures are worth it.
     pub fn reflect_flat_senders(&mut self, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        if !self.elements.nodes[0].active {
+            return;
+        }
         let mut wanted = vec![false; self.elements.nodes.len()];
         self.exitant.senders.standing.iter().for_each(|standing| wanted[standing.leaf as usize] = true);
         self.shown.iter().for_each(|(leaf, _)| wanted[*leaf as usize] = false);
