@@ -13,7 +13,7 @@ use glam::Vec3;
 use smallvec::SmallVec;
 
 /// Normals of a face cluster differ by at most this (radians) from their axis.
-const NORMALS: f32 = 0.1;
+pub(crate) const NORMALS: f32 = 0.1;
 
 /// Vertices take the light of face clusters whose middles are nearer than so many times their radius.
 const REACH: f32 = 3.0;

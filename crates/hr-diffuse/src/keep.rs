@@ -11,6 +11,7 @@ use crate::flat::{FlatError, Reader, Writer, are_offsets, fits, is_finite};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::links::{Link, Links};
+use crate::misjudged::Misjudged;
 use crate::refine::Pair;
 use crate::reflect::{Representative, Senders};
 use crate::resume::Unfinished;
@@ -318,6 +319,7 @@ impl Exitant {
             peak: from.take_finite("peaks")?,
             adaptation: from.take_finite("what errors count")?,
             senders: Senders { ranges: from.take(SENDERS)?, standing: from.take(SENDERS)? },
+            misjudged: Misjudged::default(),
         };
         let lengths = [
             exitant.radiosity.len(),

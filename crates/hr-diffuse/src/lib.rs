@@ -37,6 +37,7 @@ mod kept_weights;
 mod leaf_rows;
 pub mod links;
 mod lobes;
+mod misjudged;
 mod moved;
 pub mod oracle;
 mod places;

@@ -2,12 +2,14 @@
 //!
 //! In a finely cut scene polygons may be much smaller than what the error asks for. Then links begin and end at clusters far
 //! above them: refinement found it fine enough to take each of these for one. What a leaf finds out about the links above it,
-//! its neighbours find out once more. So a node in one plane, below which no link begins or ends, is one place, as a leaf of
-//! its size is in the same scene without the cuts: it looks for itself once, from points all over it, and the leaves below get
-//! what arrives there. Where the edge of a shadow passes through it is divided, as a leaf would be.
+//! its neighbours find out once more. So a node that is nearly in one plane, below which no link begins or ends, is one place, as a
+//! leaf of its size is in the same scene without the cuts: it looks for itself once, from points all over it, and the leaves below
+//! get what arrives there. Where the edge of a shadow passes through it is divided, as a leaf would be. Round meshes are cut so
+//! everywhere: their places bend no more than [face clusters](crate::face_clusters), which reflect as one what arrives there.
 
+use crate::face_clusters::NORMALS;
 use crate::hierarchy::{Elements, Kind, grafted};
-use crate::hooks::{FLAT_COSINE, LightField};
+use crate::hooks::LightField;
 use crate::links::Links;
 use crate::sampling::hash;
 use crate::segments::visibility;
@@ -16,21 +18,32 @@ use crate::transport::Light;
 use crate::visibility::{NO_BLOCKER, Proof};
 use glam::Vec3;
 
-/// Leaves whose heights over a plane differ by less than this share of their cluster's radius lie in one plane.
+/// Leaves whose heights over a plane differ by less than this share of their cluster's radius lie in one plane; those of a cap whose
+/// normals differ rise by half that angle more.
 const IN_PLANE: f32 = 0.02;
-/// Fewer leaves than that look for themselves: they know more of it, for little more.
+/// Fewer leaves than that look for themselves: they know more of it, for little more. With those whose light an extension reflects, which
+/// would reflect it as one all the same.
 const LEAST_LEAVES: u32 = 8;
+const LEAST_REFLECTING: u32 = 3;
 /// Segments that tell how much of a sender is seen from all over a place.
 const SEGMENTS: u32 = 16;
 
-/// What is in one plane.
+/// What is nearly in one plane.
 #[derive(Clone, Copy)]
 struct Sheet {
-    /// A leaf of it, and how far others are off its plane.
-    leaf: u32,
+    /// How far leaves are off it at most.
     off: f32,
     /// Number of leaves.
     count: u32,
+    /// Whether an extension reflects the light of any.
+    active: bool,
+}
+
+impl Sheet {
+    /// Whether it is worth to be one place.
+    fn is_large(&self) -> bool {
+        self.count >= if self.active { LEAST_REFLECTING } else { LEAST_LEAVES }
+    }
 }
 
 /// Edges of shadows that no place is to have within.
@@ -57,7 +70,7 @@ fn divided<L: LightField>(light: Light<'_, L>, links: &Links, edges: Option<Edge
                 continue;
             }
             for child in element.first_child..element.first_child + element.child_count {
-                if sheets[child as usize].is_some_and(|sheet| sheet.count >= LEAST_LEAVES) {
+                if sheets[child as usize].is_some_and(|sheet| sheet.is_large()) {
                     waiting.push(child);
                 } else {
                     each_leaf(light.elements, child, |leaf| found.push(leaf));
@@ -89,7 +102,7 @@ fn undivided<L: LightField>(light: Light<'_, L>, links: &Links) -> (Vec<u32>, Ve
     let mut taken = vec![false; nodes.len()];
     let mut places = Vec::new();
     for (node, element) in nodes.iter().enumerate() {
-        let is_joined = sheets[node].is_some_and(|sheet| sheet.count >= LEAST_LEAVES);
+        let is_joined = sheets[node].is_some_and(|sheet| sheet.is_large());
         let is_leaf = light.elements.is_patch_leaf(node as u32);
         taken[node] = node > 0 && taken[element.parent as usize];
         if !taken[node] && (is_joined || is_leaf) {
@@ -103,27 +116,26 @@ fn undivided<L: LightField>(light: Light<'_, L>, links: &Links) -> (Vec<u32>, Ve
 /// The sheet that a node is, if it is one below which there are no links.
 fn sheet(elements: &Elements, sheets: &[Option<Sheet>], linked: &[bool], node: u32) -> Option<Sheet> {
     let element = &elements.nodes[node as usize];
-    // Leaves whose light an extension reflects look for themselves; so do those that are partly covered.
-    if element.active || element.kind == Kind::Light || elements.exposed(node) < 1.0 {
+    // Leaves that are partly covered look for themselves.
+    if element.kind == Kind::Light || elements.exposed(node) < 1.0 {
         return None;
     }
+    let active = element.active;
     if element.is_patch() {
-        return (element.is_flat() && element.child_count == 0).then_some(Sheet { leaf: node, off: 0.0, count: 1 });
+        return (element.is_flat() && element.child_count == 0).then_some(Sheet { off: 0.0, count: 1, active });
     }
-    let children = element.first_child..element.first_child + element.child_count;
-    let first = sheets[element.first_child as usize]?;
-    let plane = &elements.nodes[first.leaf as usize];
-    let (mut off, mut count) = (first.off, 0);
-    for child in children {
+    let bend = element.normals.angle();
+    if bend > NORMALS {
+        return None;
+    }
+    let (mut off, mut count) = (0.0_f32, 0);
+    for child in element.first_child..element.first_child + element.child_count {
         let sheet = sheets[child as usize].filter(|_| !linked[child as usize])?;
-        let other = &elements.nodes[sheet.leaf as usize];
-        if plane.normals.axis.dot(other.normals.axis) < FLAT_COSINE {
-            return None;
-        }
+        let from_middle = elements.nodes[child as usize].center - element.center;
         count += sheet.count;
-        off = off.max(sheet.off + (other.center - plane.center).dot(plane.normals.axis).abs());
+        off = off.max(sheet.off + from_middle.dot(element.normals.axis).abs());
     }
-    (off < IN_PLANE * element.radius).then_some(Sheet { leaf: first.leaf, off, count })
+    (off < (IN_PLANE + 0.5 * bend) * element.radius).then_some(Sheet { off, count, active })
 }
 
 /// Whether the edge of a shadow passes through a place, and the number of rays shot to know: whether it sees a sender in part that
@@ -206,9 +218,13 @@ impl Places {
         (0..self.nodes.len()).filter(|&index| nodes.next_if_eq(&self.nodes[index]).is_some()).collect()
     }
 
-    /// The leaves of these.
-    pub(crate) fn leaves_of_joined(&self) -> &[u32] {
-        &self.leaves
+    /// The leaves of those of at least so many, and how many of such places there are.
+    pub(crate) fn leaves_of(&self, least: usize) -> (Vec<u32>, usize) {
+        let ends = self.joined.iter().map(|place| place.end as usize);
+        let starts = std::iter::once(0).chain(ends.clone());
+        let ranges = starts.zip(ends).map(|(start, end)| &self.leaves[start..end]);
+        let large: Vec<&[u32]> = ranges.filter(|leaves| leaves.len() >= least).collect();
+        (large.concat(), large.len())
     }
 
     /// Calls `visit` with each leaf and the position of its place among all; of places of many leaves also with the position among

@@ -36,6 +36,8 @@ const FAR: f32 = 0.25;
 /// Links that bring a leaf more than this share of its light from near by, times the square root of the tolerance, are looked at from
 /// several points of it.
 const MUCH_SHARE: f32 = 0.045;
+/// The middle of a place of many leaves stands for all of it where it gets at least this share of the mean.
+const FACES: f32 = 0.5;
 /// Points of a place lie across a line if they do by this share of their spread (of squares).
 const LEAST_SPREAD: f32 = 0.01;
 /// Irradiance × importance × √(share of all area) that a place of many leaves may be off its mean by for the edge of a shadow, as a
@@ -428,13 +430,37 @@ impl Place {
     /// What a link brings that is wholly visible, where it varies over the place.
     fn varying<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
         let at = |x: Vec3, n: Vec3| light.arriving_at(x, n, link.sender, self.negligible).0.element_sum();
-        let values: SmallVec<[f32; 8]> = self.points.iter().map(|&(x, n, weight)| weight * at(x, n)).collect();
-        let value = values.iter().sum();
-        let element = light.element(self.node);
-        if element.is_patch() {
+        if light.element(self.node).is_patch() {
+            let value = self.points.iter().map(|&(x, n, weight)| weight * at(x, n)).sum();
             return Weight { value, ..Weight::default() };
         }
-        // The plane that fits best: of (s, t) from the mean of the points, by the normal equations.
+        self.fitted(light, at)
+    }
+
+    /// The same of a sender that is far, by what arrives in the middle.
+    fn from_afar<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
+        let (x, n, _) = self.middle;
+        let value = light.arriving_at(x, n, link.sender, self.negligible).0.element_sum();
+        if light.element(self.node).is_patch() || light.elements.is_distant(NodeId(link.sender)) {
+            return Weight { value, ..Weight::default() };
+        }
+        let sender = light.element(link.sender).center;
+        let kernel = |x: Vec3, n: Vec3| {
+            let to = sender - x;
+            to.dot(n).max(0.0) / (to.length_squared() * to.length()).max(f32::MIN_POSITIVE)
+        };
+        let fitted = self.fitted(light, kernel);
+        let in_middle = kernel(x, n);
+        // Where the middle hardly faces the sender it tells little of the rest.
+        if in_middle > FACES * fitted.value { fitted * (value / in_middle) } else { self.varying(light, link) }
+    }
+
+    /// The plane over a place of many leaves that fits best what is there `at` points with normals.
+    fn fitted<L: LightField>(&self, light: Light<'_, L>, at: impl Fn(Vec3, Vec3) -> f32) -> Weight {
+        let values: SmallVec<[f32; 8]> = self.points.iter().map(|&(x, n, weight)| weight * at(x, n)).collect();
+        let value: f32 = values.iter().sum();
+        let element = light.element(self.node);
+        // Of (s, t) from the mean of the points, by the normal equations.
         let (u, v) = self.middle.1.any_orthonormal_pair();
         let mean: Vec3 = self.points.iter().map(|&(x, _, weight)| x * weight).sum();
         let (mut squares, mut products) = ([0.0; 3], Vec2::ZERO);
@@ -481,12 +507,10 @@ impl Place {
         let shared = is_shared(light, link.receiver);
         let here = if !shared {
             Weight { value: mean, ..Weight::default() }
-        } else if !element.is_patch() || !far && mean * visible > self.much {
+        } else if !far && (!element.is_patch() || mean * visible > self.much) {
             self.varying(light, link)
-        } else if flat {
-            let (x, n, _) = self.middle;
-            let value = light.arriving_at(x, n, link.sender, self.negligible).0.element_sum();
-            Weight { value, ..Weight::default() }
+        } else if flat || !element.is_patch() {
+            self.from_afar(light, link)
         } else {
             let direction = light.direction_to(element.center, link.sender);
             let (irradiance, _) = light.arriving_at(element.center, direction, link.sender, self.negligible);

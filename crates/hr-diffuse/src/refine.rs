@@ -597,7 +597,7 @@ fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) ->
     // A cluster near by is not a point: what its parts make of irradiance says what it counts for as a whole.
     let whole = light.emitted(pair.sender, -direction).element_sum();
     // Directional light differs from what moments of normals say for other reasons: a factor that makes up for it would make spots.
-    let misjudged = !s.active && light.is_misjudged(pair.sender, -direction);
+    let misjudged = !s.active && light.exitant.misjudged.may_be(pair.sender, -direction);
     let near = s.radius > 0.25 * distance;
     let resolve = s.kind == Kind::Cluster && (near || misjudged) && whole > 0.0;
     let factor_at = |x: Vec3, n: Vec3| {

@@ -14,6 +14,7 @@ use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::kept_weights::KeptWeights;
 use crate::links::Links;
+use crate::misjudged::Misjudged;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::{Reflect, Senders};
 use crate::relight::{Linked, ratio};
@@ -224,6 +225,7 @@ impl<L: LightField> Solver<L> {
             gain: vec![1.0; count],
             adaptation: vec![1.0; count],
             senders: Senders::default(),
+            misjudged: Misjudged::default(),
         };
         let incident = std::iter::repeat_with(L::Incident::default).take(count).collect();
         let reflected = std::iter::repeat_with(L::Exitant::default).take(count).collect();
@@ -232,6 +234,7 @@ impl<L: LightField> Solver<L> {
         solver.unfinished = Unfinished::new(vec![Pair { receiver: 0, sender: 0 }]);
         solver.stats.polygons = input.surfaces.len() as u64;
         solver.pull();
+        solver.exitant.misjudged = Misjudged::new(&solver.elements, &solver.exitant);
         solver.stats.skipped.sealed_sides = solver.elements.sealed_sides();
         solver.stats.seconds.build = start.elapsed().as_secs_f64();
         Ok(solver)
@@ -608,6 +611,7 @@ impl<L: LightField> Solver<L> {
     /// Refines all links to a tolerance.
     fn refine(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let start = Instant::now();
+        self.exitant.misjudged = Misjudged::new(&self.elements, &self.exitant);
         // Where light has come by other links what was found then still holds.
         if self.gather.is_for(&self.links) {
             self.exitant.adaptation = adaptation(self.light(), &self.gather, &self.links);
@@ -741,6 +745,7 @@ impl<L: LightField> Solver<L> {
     pub(crate) fn prepare(&mut self, tolerance: Option<f32>, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         let start = Instant::now();
         self.shown.clear();
+        self.exitant.misjudged = Misjudged::new(&self.elements, &self.exitant);
         let error = tolerance.map(|tolerance| if self.skips.faint_links { tolerance } else { 0.0 });
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
         let known = tolerance.and_then(|_| self.kept_weights.take());

@@ -5,6 +5,7 @@ use crate::form_factor::{self, CURVED_FAR, FAR};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField, NodeId};
 use crate::links::Link;
+use crate::misjudged::Misjudged;
 use crate::reflect::{Representative, Senders};
 use crate::{Cone, Facing, LightKind, Rgb};
 use glam::Vec3;
@@ -13,12 +14,6 @@ use std::f32::consts::PI;
 /// Where a node's radius is less than this share of its distance, it is taken as a whole when light is gathered
 /// at a point; else its children are.
 const CLUSTER_FAR: f32 = 0.25;
-
-/// Moments of normals that tell more or less than this share of what the surfaces of a cluster show in a direction are no good there: it
-/// is taken by its parts.
-const MISJUDGED: f32 = 0.03;
-/// Levels of parts that are looked at for it. Moments add up, so only that of surfaces tells something new.
-const PART_LEVELS: u32 = 3;
 
 /// Senders that cannot bring more than this share of a place's irradiance, times the square root of the tolerance, are negligible there.
 const NEGLIGIBLE_SHARE: f32 = 0.065;
@@ -48,6 +43,8 @@ pub struct Exitant {
     pub peak: Vec<f32>,
     /// How much more errors count than where it is bright, ≥ 1: see [adaptation](crate::adaptation).
     pub(crate) adaptation: Vec<f32>,
+    /// Where clusters are no good as wholes.
+    pub(crate) misjudged: Misjudged,
 }
 
 /// Read access to a (partial) solution: geometry, hierarchy and exitant light.
@@ -127,34 +124,6 @@ impl<L: LightField> Light<'_, L> {
         match self.element(sender).kind {
             Kind::Cluster => radiosity * self.exitant.facing[sender as usize].mean_cosine(away),
             Kind::Light | Kind::Front | Kind::Back => radiosity,
-        }
-    }
-
-    /// Whether the diffuse light of a cluster in a direction is misjudged by the moments of its normals. Those of a box tell up to four times
-    /// too much of its narrow sides, and a tenth too little in between.
-    pub(crate) fn is_misjudged(&self, sender: u32, away: Vec3) -> bool {
-        // What is pure metal has no diffuse light, nor has any part of it.
-        if self.element(sender).kind != Kind::Cluster || self.exitant.radiosity[sender as usize] == Rgb::ZERO {
-            return false;
-        }
-        let by_moments = self.shown(sender, away, 0);
-        let by_parts = self.shown(sender, away, PART_LEVELS);
-        (by_moments - by_parts).abs() > MISJUDGED * by_parts
-    }
-
-    /// Diffuse power per solid angle (× π, sum of channels) of a node in a direction, by its parts so many levels down.
-    fn shown(&self, node: u32, away: Vec3, levels: u32) -> f32 {
-        let element = self.element(node);
-        match element.kind {
-            Kind::Light => 0.0,
-            Kind::Cluster if levels > 0 => {
-                let parts = element.first_child..element.first_child + element.child_count;
-                parts.map(|part| self.shown(part, away, levels - 1)).sum()
-            }
-            Kind::Cluster | Kind::Front | Kind::Back => {
-                let power = self.exitant.radiosity[node as usize].element_sum() * element.area;
-                power * self.exitant.facing[node as usize].mean_cosine(away)
-            }
         }
     }
 
@@ -325,7 +294,7 @@ impl<L: LightField> Light<'_, L> {
         let children = element.first_child..element.first_child + element.child_count;
         let away = if distance > 0.0 { to / distance } else { element.normals.axis };
         let near = element.radius > CLUSTER_FAR * distance;
-        if (near || self.is_misjudged(sender, away)) && !children.is_empty() {
+        if (near || self.exitant.misjudged.may_be(sender, away)) && !children.is_empty() {
             let resolve = element.kind == Kind::Cluster || {
                 let [low, high] = self.exitant.range[sender as usize];
                 element.active || (high - low).max_element() > 0.1 * high.max_element()

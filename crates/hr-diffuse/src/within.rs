@@ -14,6 +14,8 @@ use crate::vertices::Vertices;
 
 /// Leaves around a vertex whose irradiances differ by more than this share of the largest have an edge between them.
 const EDGE: f32 = 0.25;
+/// In places of fewer leaves vertices find out for themselves: too many of them lie at borders.
+const LEAST_LEAVES: usize = 8;
 /// Values of neighbouring places mix over about the square root of the number of rounds, in leaves, which places have a multiple of
 /// from side to side.
 const LEAVES_PER_ROUND: usize = 4;
@@ -37,7 +39,7 @@ impl Within {
 
     /// Finds the vertices within.
     pub(crate) fn new<L: LightField>(light: Light<'_, L>, places: &Places, vertices: &Vertices) -> Self {
-        let leaves = places.leaves_of_joined();
+        let (leaves, count) = places.leaves_of(LEAST_LEAVES);
         if leaves.is_empty() {
             return Self::none(vertices);
         }
@@ -51,9 +53,9 @@ impl Within {
                 around.iter().map(irradiance).fold((f32::MAX, 0.0_f32), |(low, high), e| (low.min(e), high.max(e)));
             around.iter().all(|&leaf| is_joined[leaf as usize]) && high - low <= EDGE * high
         };
-        let rounds = (leaves.len() / places.joined().len() / LEAVES_PER_ROUND).clamp(1, MOST_ROUNDS);
+        let rounds = (leaves.len() / count / LEAVES_PER_ROUND).clamp(1, MOST_ROUNDS);
         let holds = (0..vertices.positions.len() as u32).into_par_iter().with_min_len(1024).map(holds).collect();
-        Self { leaves: leaves.to_vec(), rounds, holds }
+        Self { leaves, rounds, holds }
     }
 
     /// Whether a vertex lies within.

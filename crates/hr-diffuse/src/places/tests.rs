@@ -105,6 +105,44 @@ fn places_end_at_edges_of_shadows() {
     assert!((lit / open - 1.0).abs() < 0.2 * ERROR, "{lit} of {open} arrives");
 }
 
+/// Round meshes are cut more finely than their light asks for: places bend with them. Against the closed form, on the side of a ball that sees
+/// all of the lamp.
+#[test]
+fn places_bend_with_round_meshes() {
+    const RINGS: u32 = 60;
+    let angle = |i: u32| f64::from(i) * std::f64::consts::PI / f64::from(RINGS);
+    let at = |i: u32, j: u32| {
+        let ((sin, cos), (up, along)) = (angle(2 * i).sin_cos(), angle(j).sin_cos());
+        DVec3::new(0.5, 0.5, -0.2) + 0.3 * DVec3::new(cos * up, sin * up, -along)
+    };
+    let ball = (0..RINGS * RINGS).flat_map(|cell| {
+        let (i, j) = (cell / RINGS, cell % RINGS);
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        let upper = (j > 0).then(|| Surface::new(Shape::Triangle([a, b, c]), 0));
+        upper.into_iter().chain((j + 1 < RINGS).then(|| Surface::new(Shape::Triangle([a, c, d]), 0)))
+    });
+    let plain = floor(false);
+    let lamp = plain.surfaces[(PARTS * PARTS) as usize].clone();
+    let input = SceneInput { surfaces: [lamp].into_iter().chain(ball).collect(), ..plain };
+    fn looked<L: crate::LightField>(solver: &Solver<L>) -> [f32; 2] {
+        let (light, lamp) = (solver.light(), solver.elements.surface_nodes[0][0]);
+        let (mut off, mut all) = (0.0, 0.0);
+        for leaf in solver.elements.patch_leaves().filter(|&leaf| light.element(leaf).normals.axis.z > 0.5) {
+            let element = light.element(leaf);
+            let open = light.factor_at(element.center, element.normals.axis, lamp);
+            off += element.area * (solver.exitant.irradiance[leaf as usize].x - open).abs();
+            all += element.area * open;
+        }
+        let places = solver.gather.places().nodes.len() as f32 / solver.elements.patch_leaves().count() as f32;
+        [places, off / all]
+    }
+    let [places, off] = looked(&solve(&input, ERROR, (), Skips::ALL));
+    assert!(places < 0.65 && off < 0.3 * ERROR, "{places} places for each leaf, off by {off}");
+    let glossy = crate::skips::tests::Echo { material: 0, albedo: 0.4, errs: false };
+    let [places, off] = looked(&solve(&input, ERROR, glossy, Skips::ALL));
+    assert!(places < 0.4 && off < 0.3 * ERROR, "{places} places for each glossy leaf, off by {off}");
+}
+
 #[test]
 #[cfg(feature = "parallel")]
 fn threads_change_nothing() {
