@@ -228,10 +228,9 @@ fn together(samples: &[Incident]) -> Incident {
 /// The outline of a sender as it is seen from a place, in its frame.
 fn contour(FlatPart { center, sides: Sides { across, along, taper } }: &FlatPart, place: &Place) -> Contour {
     let to = *center - place.at;
-    let distance2 = to.length_squared();
-    // Only what is perpendicular to the direction is seen.
-    let seen = |side: &Vec3| place.local(side - to * (side.dot(to) / distance2)) / distance2.sqrt();
-    Contour::new(seen(across), seen(along), *taper)
+    let near = to.length().recip();
+    let [middle, across, along] = [to, *across, *along].map(|v| place.local(v) * near);
+    Contour::new(middle, across, along, *taper)
 }
 
 /// Adds a sample received at `from` as it arrives at `place`, of wide senders in parts if these count; nothing below the horizon.

@@ -3,59 +3,71 @@
 //! What [`extent`](super::extent) says of disks holds for any small shape: seen through the slopes of half vectors it is
 //! mapped linearly. A trapezoid stays one, and the mean over it of either lobe is exact or nearly: of the GGX density the
 //! integral is a sum over edges, of a Gaussian an integral along one axis of error functions along the other.
+//!
+//! Senders that are near are seen in perspective, and the map to slopes bends them. So the trapezoid is that of the linear map where
+//! lobe and sender meet, and what the second order adds is counted as it is on average over the product of both ([`Expansion`]).
 
 use super::HORIZON;
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_2_SQRT_PI, FRAC_PI_4};
 
-/// Contour of a flat sender as it is seen: a trapezoid about its middle, the directions
-/// middle + s (1 − taper t) across + (t + taper/3) along, for −1 ≤ s, t ≤ 1.
+/// Contour of a flat sender: a trapezoid about its middle, the directions of
+/// middle + s (1 − taper t) across + (t + taper/3) along, for −1 ≤ s, t ≤ 1, the middle's being of unit length.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contour {
-    /// Half of the mean width, in radians: a vector perpendicular to the direction of the middle.
+    /// Half of the mean width over the distance of the middle.
     across: Vec3,
     /// Half of the height, likewise.
     along: Vec3,
     /// 0 for a parallelogram, 1 for a triangle.
     taper: f32,
-    /// Radius about the middle that holds it; 0 where the sender has no contour.
+    /// Tangent of the angle about the middle that holds it; 0 where the sender has no contour.
     reach: f32,
 }
 
 /// A contour shows if it reaches this many widths of a lobe far. Directions turn by twice as much as half vectors, so that the
 /// variance of a smaller one is below a fiftieth of the lobe's.
-const SHOWN: f32 = 0.35;
-/// Wider contours than this (radians) are not seen as a part of a plane any more.
+const SHOWN: f32 = 0.25;
+/// Wider contours than this (a tangent) are not seen as a part of a plane any more.
 const WIDEST: f32 = 0.8;
 
 impl Contour {
     /// Nothing is known of the sender's shape.
     pub const NONE: Self = Self { across: Vec3::ZERO, along: Vec3::ZERO, taper: 0.0, reach: 0.0 };
 
-    /// From half of the mean width and of the height, vectors perpendicular to the direction of the sender's middle, in
-    /// radians, and a taper of 0…1. What is too wide, or no number, has none.
+    /// From the unit direction of the sender's middle; half of the mean width and of the height, as vectors in units of the
+    /// middle's distance; and a taper of 0…1. What is too wide, or no number, has none.
     #[must_use]
-    pub fn new(across: Vec3, along: Vec3, taper: f32) -> Self {
+    pub fn new(middle: Vec3, across: Vec3, along: Vec3, taper: f32) -> Self {
         let taper = taper.clamp(0.0, 1.0);
-        // From the middle the wide end is (1 − taper/3) away, the narrow one (1 + taper/3).
-        let wide = (1.0 + taper) * across.length() + (1.0 - taper / 3.0) * along.length();
-        let narrow = (1.0 - taper) * across.length() + (1.0 + taper / 3.0) * along.length();
-        let reach = wide.max(narrow);
+        let recede = [across, along].map(|side| middle.dot(side));
+        let [aside, above] = [across - middle * recede[0], along - middle * recede[1]];
+        let tangent2 = |(s, t): (f32, f32)| {
+            let depth = (1.0 + s * recede[0] + t * recede[1]).max(0.0);
+            (aside * s + above * t).length_squared() / (depth * depth)
+        };
+        let (wide, narrow) = (1.0 + taper, 1.0 - taper);
+        let (low, high) = (taper / 3.0 - 1.0, taper / 3.0 + 1.0);
+        let corners = [(wide, low), (-wide, low), (narrow, high), (-narrow, high)];
+        let reach = corners.map(tangent2).into_iter().fold(0.0, f32::max).sqrt();
         if reach <= WIDEST { Self { across, along, taper, reach } } else { Self::NONE }
     }
 
-    /// Radius (radians) about the middle that holds it; 0 where the sender has no contour.
+    /// Tangent of the angle about the middle that holds it; 0 where the sender has no contour.
     #[must_use]
     pub fn reach(&self) -> f32 {
         self.reach
     }
 
-    /// The same, each side at least as long as that of a square as large as a disk of this radius.
-    pub(super) fn widened(&self, least: f32) -> Self {
+    /// The same about its middle, each side seen at least as long as that of a square as large as a disk of this radius.
+    pub(super) fn widened(&self, middle: Vec3, least: f32) -> Self {
         // √π/2
         let least = 0.886_226_9 * least;
-        let widened = |side: Vec3| side * (least / side.length().max(f32::MIN_POSITIVE)).max(1.0);
-        if self.reach > 0.0 { Self::new(widened(self.across), widened(self.along), self.taper) } else { *self }
+        let widened = |side: Vec3| {
+            let seen = side - middle * middle.dot(side);
+            side + seen * (least / seen.length().max(f32::MIN_POSITIVE) - 1.0).max(0.0)
+        };
+        if self.reach > 0.0 { Self::new(middle, widened(self.across), widened(self.along), self.taper) } else { *self }
     }
 
     /// Whether all of it is above the horizon, seen about `middle`, and a lobe of half-vector slopes as wide as this (RMS) shows that
@@ -65,10 +77,17 @@ impl Contour {
         self.reach > SHOWN * width && middle.z - self.reach > HORIZON
     }
 
-    /// A direction of it, not normalised.
+    /// To the second order about the mean of its product with a lobe.
     #[inline]
-    pub(super) fn point(&self, middle: Vec3, [s, t]: [f32; 2]) -> Vec3 {
-        middle + self.across * s + self.along * t
+    pub(super) fn about(&self, middle: Vec3, product: Product) -> Expansion {
+        let [s, t] = product.mean;
+        let moved = middle + self.across * s + self.along * t;
+        let nearness = moved.length_recip();
+        let incident = moved * nearness;
+        let sides = [self.across * nearness, self.along * nearness];
+        let recede = sides.map(|side| incident.dot(side));
+        let turns = [sides[0] - incident * recede[0], sides[1] - incident * recede[1]];
+        Expansion { incident, turns, recede, nearness, product, taper: self.taper }
     }
 
     /// What a linear map to slopes makes of it about the slope of its middle.
@@ -78,7 +97,68 @@ impl Contour {
     }
 }
 
-/// An [`Contour`] in the plane of slopes, about a lobe in the origin.
+/// Product of a lobe and a contour, both taken for Gaussians, in steps s and t along the contour's sides.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Product {
+    /// As far as it is within the contour.
+    mean: [f32; 2],
+    /// ss, st, tt.
+    covariance: [f32; 3],
+}
+
+/// A contour to the second order about the direction where it meets a lobe.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Expansion {
+    /// The direction.
+    pub incident: Vec3,
+    /// What it turns by with a step along each side.
+    pub turns: [Vec3; 2],
+    /// Share of the distance that is added.
+    recede: [f32; 2],
+    /// Distance of the sender's middle over that in this direction.
+    nearness: f32,
+    product: Product,
+    taper: f32,
+}
+
+impl Expansion {
+    /// Mean squared angle from the direction after steps of such a covariance.
+    #[inline]
+    fn spread(&self, [ss, st, tt]: [f32; 3]) -> f32 {
+        let [u, v] = self.turns;
+        ss * u.length_squared() + 2.0 * st * u.dot(v) + tt * v.length_squared()
+    }
+
+    /// What a map to a plane makes of it. `at` is what it makes of the direction, `map` the derivative there; a step along each side
+    /// changes that by the factor 1 − `shrinks`, and what turns by |x| moves by −`fall` |x|²/2.
+    ///
+    /// The image is a parallel to that of the linear map, through the mean of what is right.
+    #[inline]
+    pub(super) fn mapped(&self, at: Vec2, shrinks: [f32; 2], fall: Vec2, map: impl Fn(Vec3) -> Vec2) -> Trapezoid {
+        let ([s, t], [ss, st, tt]) = (self.product.mean, self.product.covariance);
+        let [across, along] = self.turns.map(map);
+        let [x, y] = [self.recede[0] + shrinks[0], self.recede[1] + shrinks[1]];
+        let back = across * (s + ss * x + st * y) + along * (t + st * x + tt * y);
+        let middle = at - back - fall * (0.5 * self.spread(self.product.covariance));
+        Trapezoid { middle, across, along, taper: self.taper }
+    }
+
+    /// Irradiance that an area of the sender makes where it meets the lobe over the mean of its areas. `cosine` is that of its middle;
+    /// what else the lobe is multiplied by is counted, too, as far as it rises by the share `rise` |x|² at an angle |x|.
+    ///
+    /// Areas count by cosine/distance⁴, the cosine not being that of a unit vector: in second order by −2 |x|² + 10 recede². What
+    /// the cosine adds to that is left out, so that nothing can become negative.
+    #[inline]
+    pub(super) fn weight(&self, cosine: f32, rise: f32) -> f32 {
+        let ([ss, _, tt], (s, t)) = (self.product.covariance, variances(self.taper));
+        let bulge = 2.0 * self.spread([s, 0.0, t]) - (2.0 - rise) * self.spread(self.product.covariance);
+        let [x, y] = self.recede;
+        let depth = 10.0 * (x * x * (s - ss) + y * y * (t - tt));
+        self.incident.z * self.nearness.powi(3) * (1.0 + bulge) / (cosine * (1.0 + depth))
+    }
+}
+
+/// A [`Contour`] in the plane of slopes, about a lobe in the origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trapezoid {
     /// Its centroid.
@@ -86,6 +166,13 @@ pub(super) struct Trapezoid {
     pub across: Vec2,
     pub along: Vec2,
     pub taper: f32,
+}
+
+/// Variances of s (1 − taper t) and t over a trapezoid.
+#[inline]
+fn variances(taper: f32) -> (f32, f32) {
+    let taper2 = taper * taper;
+    ((1.0 + taper2) / 3.0, 1.0 / 3.0 - taper2 / 9.0)
 }
 
 /// Nodes and weights of quadratures by Gauss and Legendre, on −1…1.
@@ -99,17 +186,10 @@ impl Trapezoid {
         Self { middle: self.middle * scale, across: self.across * scale, along: self.along * scale, ..*self }
     }
 
-    /// Variances of s (1 − taper t) and t.
-    #[inline]
-    fn variances(&self) -> (f32, f32) {
-        let taper2 = self.taper * self.taper;
-        ((1.0 + taper2) / 3.0, 1.0 / 3.0 - taper2 / 9.0)
-    }
-
     /// For M = `lobe` I + covariance: det M and (det M) M⁻¹ middle.
     #[inline]
     fn solve(&self, lobe: f32, share: f32) -> (f32, Vec2) {
-        let (s, t) = self.variances();
+        let (s, t) = variances(self.taper);
         let (u, v, m) = (self.across, self.along, self.middle);
         let xx = lobe + share * (s * u.x * u.x + t * v.x * v.x);
         let xy = share * (s * u.x * u.y + t * v.x * v.y);
@@ -118,13 +198,21 @@ impl Trapezoid {
         (det, Vec2::new(yy * m.x - xy * m.y, xx * m.y - xy * m.x))
     }
 
-    /// Steps along both sides from the middle to where it meets a lobe of a variance about the origin: the mean of the
-    /// product of two Gaussians, as far as that is within.
-    #[inline]
-    pub(super) fn toward_lobe(&self, variance: f32) -> [f32; 2] {
-        let (s, t) = self.variances();
-        let (det, solved) = self.solve(variance, 1.0);
-        [s * self.across.dot(solved), t * self.along.dot(solved)].map(|step| (-step / det).clamp(-1.0, 1.0))
+    /// With a lobe of a variance about the origin.
+    // Called out of line it would cost a tenth of all there is to do for a contour.
+    #[inline(always)]
+    pub(super) fn product(&self, variance: f32) -> Product {
+        let (s, t) = variances(self.taper);
+        let (u, v) = (self.across, self.along);
+        // The inverse of the covariance is the sum of those of both: of diag(s, t), and of (u v)ᵀ(u v) / variance as it is.
+        let (uu, uv, vv) = (variance + s * u.length_squared(), u.dot(v), variance + t * v.length_squared());
+        let share = (uu * vv - s * t * uv * uv).max(variance * variance).recip();
+        let (mu, mv) = (self.middle.dot(u), self.middle.dot(v));
+        let third = self.taper / 3.0;
+        let along = (t * share * (s * uv * mu - uu * mv)).clamp(third - 1.0, third + 1.0);
+        let half = 1.0 - self.taper * (along - third);
+        let across = (s * share * (t * uv * mv - vv * mu)).clamp(-half, half);
+        Product { mean: [across, along], covariance: [s * vv, -s * t * uv, t * uu].map(|x| x * (share * variance)) }
     }
 
     /// Four times the area of the half.
@@ -180,7 +268,7 @@ impl Trapezoid {
     pub(super) fn ggx(&self) -> f32 {
         let fall = (1.0 + self.middle.length_squared()).recip();
         if self.size2() * fall < 0.03 {
-            let (s, t) = self.variances();
+            let (s, t) = variances(self.taper);
             let (u, v) = (self.across, self.along);
             let (mu, mv) = (self.middle.dot(u), self.middle.dot(v));
             let curvature = 12.0 * fall * fall * (s * mu * mu + t * mv * mv)

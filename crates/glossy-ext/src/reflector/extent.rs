@@ -105,7 +105,12 @@ impl Slopes {
     /// J v, for any v.
     #[inline]
     fn slope_of(&self, v: Vec3) -> Vec2 {
-        let v = v - self.incident * self.incident.dot(v);
+        self.slope_of_half(v - self.incident * self.incident.dot(v))
+    }
+
+    /// Change of the slope with the half vector, J v for v perpendicular to the incident direction.
+    #[inline]
+    fn slope_of_half(&self, v: Vec3) -> Vec2 {
         (v.truncate() - self.slope * v.z) * self.stretch * self.inv_z
     }
 
@@ -135,7 +140,7 @@ pub(super) struct Meeting {
     pub h: Vec3,
     /// Squared slope of h.
     pub tan2: f32,
-    /// Cosine there / mean cosine of the disk.
+    /// Cosine there / mean cosine of the sender.
     pub weight: f32,
     radius2: f32,
     slopes: Slopes,
@@ -167,42 +172,43 @@ impl Meeting {
                 middle = slopes.slope * stretch + slopes.slope_of(disk.middle - incident);
             }
         }
-        Self::at(slopes, middle, disk)
+        Self::at(slopes, middle, disk.radius2, slopes.incident.z / disk.mean_cos)
     }
 
-    fn at(slopes: Slopes, middle: Vec2, disk: &Disk) -> Self {
+    #[inline]
+    fn at(slopes: Slopes, middle: Vec2, radius2: f32, weight: f32) -> Self {
         Self {
             incident: slopes.incident,
             h: slopes.half,
             tan2: slopes.slope.length_squared(),
-            weight: slopes.incident.z / disk.mean_cos,
-            radius2: disk.radius2,
+            weight,
+            radius2,
             slopes,
             middle,
         }
     }
 
     /// The same for a sender with a contour, all of which is above the horizon; and what the contour is in the plane of
-    /// stretched slopes, by the linear map at the meeting.
+    /// stretched slopes. The smooth factor rises by the share `rise` |x|² at an angle |x|.
     #[inline]
     pub(super) fn within(
         (disk, contour): (&Disk, &Contour),
         outgoing: Vec3,
         stretch: Vec2,
         variance: impl Fn(f32) -> f32,
+        rise: f32,
     ) -> (Self, Trapezoid) {
-        let mut slopes = Slopes::new(disk.middle, outgoing, stretch);
-        let mut middle = slopes.slope * stretch;
-        let mut outline = contour.mapped(middle, |side| slopes.slope_of(side));
-        let step = outline.toward_lobe(variance(middle.length_squared()));
-        let moved = contour.point(disk.middle, step);
-        let incident = moved / moved.length();
-        if incident.z > HORIZON {
-            slopes = Slopes::new(incident, outgoing, stretch);
-            middle = slopes.slope * stretch + slopes.slope_of(disk.middle - incident);
-            outline = contour.mapped(middle, |side| slopes.slope_of(side));
-        }
-        (Self::at(slopes, middle, disk), outline)
+        let slopes = Slopes::new(disk.middle, outgoing, stretch);
+        let middle = slopes.slope * stretch;
+        let outline = contour.mapped(middle, |side| slopes.slope_of(side));
+        let expansion = contour.about(disk.middle, outline.product(variance(middle.length_squared())));
+        let slopes = Slopes::new(expansion.incident, outgoing, stretch);
+        // Slopes are in proportion to 1/h.z; and a direction that turns by |x| is shorter by |x|²/2 along what it was.
+        let shrinks = expansion.turns.map(|turn| turn.z * slopes.inv_z);
+        let fall = slopes.slope_of_half(expansion.incident);
+        let outline = expansion.mapped(slopes.slope * stretch, shrinks, fall, |turn| slopes.slope_of_half(turn));
+        let meeting = Self::at(slopes, outline.middle, disk.radius2, expansion.weight(disk.middle.z, rise));
+        (meeting, outline)
     }
 
     /// For M = `lobe`·I + `share`·E: √det M, and √det M × sᵀM⁻¹s with the stretched slope s of the disk's middle.

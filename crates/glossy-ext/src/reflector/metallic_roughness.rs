@@ -120,7 +120,9 @@ impl MetallicRoughness {
             return self.lobe_over_disk(disk, outgoing);
         }
         let variance = |tan2: f32| 0.25 * (alpha2 + tan2);
-        let (meeting, outline) = Meeting::within((disk, contour), outgoing, Vec2::ONE, variance);
+        // By 1/cos⁴ of the half vector: 1/2 seen head on, more at other angles.
+        const RISE: f32 = 1.0;
+        let (meeting, outline) = Meeting::within((disk, contour), outgoing, Vec2::ONE, variance, RISE);
         let density = outline.scaled(self.alpha.recip()).ggx() * (FRAC_1_PI / alpha2);
         (self.at_meeting(&meeting, density, outgoing), schlick(meeting.h), schlick(h))
     }

@@ -111,7 +111,7 @@ impl Incident {
     /// Makes the sender at least so wide (radians).
     pub fn widen(&mut self, least: f32) {
         self.extent = self.extent.max(least);
-        self.contour = self.contour.widened(least);
+        self.contour = self.contour.widened(self.direction, least);
     }
 
     /// Lets the sender be a point.

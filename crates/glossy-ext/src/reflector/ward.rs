@@ -114,7 +114,9 @@ impl Ward {
             return self.lobe_toward(*direction, outgoing);
         }
         if contour.shows(*direction, self.alpha / stretch.max_element()) {
-            let (meeting, outline) = Meeting::within((&disk, contour), outgoing, stretch, |_| 0.5 * alpha2);
+            // By |h|²/h.z⁴, seen head on.
+            const RISE: f32 = 0.75;
+            let (meeting, outline) = Meeting::within((&disk, contour), outgoing, stretch, |_| 0.5 * alpha2, RISE);
             let factor = meeting.weight * (1.0 + meeting.tan2) / (meeting.h.z * meeting.h.z);
             return factor * outline.scaled(self.alpha.recip()).gaussian();
         }

@@ -80,7 +80,7 @@ struct Incident {
     contour: Contour,
 }
 
-// A sender's outline as it is seen.
+// A sender's outline over the distance of its middle.
 struct Contour {
     across: vec3f,
     along: vec3f,
@@ -128,22 +128,34 @@ fn mean_cosine(a: Arrival, direction: vec3f) -> f32 {
     return max(max(min(series, 0.5 * (x + sqrt(x2))), x), 0.0);
 }
 
-// A contour of these half sides, at least so wide.
-fn contour_of(across: vec3f, along: vec3f, taper: f32, narrowest: f32) -> Contour {
+// Of half a side over the distance of the middle, at least so wide as it is seen.
+fn widened(side: vec3f, middle: vec3f, least: f32) -> vec3f {
+    let seen = side - middle * dot(middle, side);
+    return side + seen * max(least / max(length(seen), 1e-30) - 1.0, 0.0);
+}
+
+// A contour about its middle of these half sides, seen at least so wide.
+fn contour_of(middle: vec3f, across: vec3f, along: vec3f, taper: f32, narrowest: f32) -> Contour {
     let widest = 0.8;
     let least = 0.8862269 * narrowest;
-    let lengths = vec2f(length(across), length(along));
-    let wider = max(vec2f(1.0), least / max(lengths, vec2f(1e-30)));
-    let sides = lengths * wider;
-    let wide = (1.0 + taper) * sides.x + (1.0 - taper / 3.0) * sides.y;
-    let narrow = (1.0 - taper) * sides.x + (1.0 + taper / 3.0) * sides.y;
-    let reach = max(wide, narrow);
-    return Contour(across * wider.x, along * wider.y, taper, select(0.0, reach, reach <= widest));
+    let u = widened(across, middle, least);
+    let v = widened(along, middle, least);
+    let away = vec2f(dot(middle, u), dot(middle, v));
+    let aside = u - middle * away.x;
+    let above = v - middle * away.y;
+    // Of its corners.
+    let s = vec4f(1.0 + taper, -1.0 - taper, 1.0 - taper, taper - 1.0);
+    let t = vec4f(-1.0, -1.0, 1.0, 1.0) + taper / 3.0;
+    let depth = 1.0 + s * away.x + t * away.y;
+    let square = s * s * dot(aside, aside) + 2.0 * s * t * dot(aside, above) + t * t * dot(above, above);
+    let tangents = sqrt(max(square, vec4f(0.0))) / max(depth, vec4f(1e-30));
+    let reach = max(max(tangents.x, tangents.y), max(tangents.z, tangents.w));
+    return Contour(u, v, taper, select(0.0, reach, reach <= widest));
 }
 
 // Whether a lobe of half-vector slopes of this width shows that a sender about `middle` is no disk.
 fn shows(c: Contour, middle: vec3f, width: f32) -> bool {
-    return c.reach > 0.35 * width && c.reach > 0.0 && middle.z - c.reach > HORIZON;
+    return c.reach > 0.25 * width && c.reach > 0.0 && middle.z - c.reach > HORIZON;
 }
 
 // A sample as it arrives at a place; no irradiance below the horizon.
@@ -160,10 +172,10 @@ fn arrived(a: Arrival, at: vec3f, frame_: mat3x3f, narrowest: f32) -> Incident {
         extent = asin(sqrt(min(share, 1.0)));
         renewal = a.spread / (d2 + a.radius * a.radius);
         if OUTLINES && any(a.across != vec3f(0.0)) {
-            let unit = inverseSqrt(d2);
-            let across = (a.across - direction * dot(a.across, direction)) * unit;
-            let along = (a.along - direction * dot(a.along, direction)) * unit;
-            contour = contour_of(across * frame_, along * frame_, a.taper, narrowest);
+            let near = inverseSqrt(d2);
+            let across = a.across * frame_ * near;
+            let along = a.along * frame_ * near;
+            contour = contour_of(direction * frame_, across, along, a.taper, narrowest);
         }
     }
     let local = direction * frame_;
@@ -257,10 +269,65 @@ fn meeting_of(disk: Disk, outgoing: vec3f, stretch: vec2f, first: Slopes, varian
     return Meeting(slopes.incident, slopes.incident + outgoing, tan2, weight, slopes.square * disk.radius2, middle);
 }
 
+// J v for v perpendicular to the incident direction.
+fn slope_of_half(s: Slopes, stretch: vec2f, v: vec3f) -> vec2f {
+    return (v.xy - s.slope * v.z) * stretch * s.inv_z;
+}
+
 // J v.
 fn slope_of(s: Slopes, stretch: vec2f, v: vec3f) -> vec2f {
-    let across = v - s.incident * dot(s.incident, v);
-    return (across.xy - s.slope * across.z) * stretch * s.inv_z;
+    return slope_of_half(s, stretch, v - s.incident * dot(s.incident, v));
+}
+
+// Product of a lobe and a contour.
+struct Product {
+    mean: vec2f,
+    covariance: vec3f,      // ss, st, tt
+}
+
+// A contour about one of its directions.
+struct Expansion {
+    incident: vec3f,
+    nearness: f32,
+    recede: vec2f,
+    across: vec3f,          // turns
+    along: vec3f,
+    meeting: Product,
+    taper: f32,
+}
+
+fn expansion_of(c: Contour, middle: vec3f, meeting: Product) -> Expansion {
+    let moved = middle + c.across * meeting.mean.x + c.along * meeting.mean.y;
+    let nearness = inverseSqrt(dot(moved, moved));
+    let incident = moved * nearness;
+    let across = c.across * nearness;
+    let along = c.along * nearness;
+    let recede = vec2f(dot(incident, across), dot(incident, along));
+    return Expansion(incident, nearness, recede, across - incident * recede.x, along - incident * recede.y, meeting, c.taper);
+}
+
+// Mean squared angle at steps of this covariance.
+fn spread(e: Expansion, covariance: vec3f) -> f32 {
+    let squares = vec3f(dot(e.across, e.across), 2.0 * dot(e.across, e.along), dot(e.along, e.along));
+    return dot(covariance, squares);
+}
+
+// What is mapped to the plane of slopes, these being where the middle and the turns are mapped to.
+fn mapped(e: Expansion, at: vec2f, shrinks: vec2f, fall: vec2f, across: vec2f, along: vec2f) -> Trapezoid {
+    let c = e.meeting.covariance;
+    let bend = e.recede + shrinks;
+    let back = e.meeting.mean + vec2f(dot(c.xy, bend), dot(c.yz, bend));
+    let middle = at - across * back.x - along * back.y - fall * (0.5 * spread(e, c));
+    return Trapezoid(middle, across, along, e.taper);
+}
+
+// Irradiance from there over the mean of all parts.
+fn weight_of(e: Expansion, cosine: f32, rise: f32) -> f32 {
+    let c = e.meeting.covariance;
+    let all = variances(e.taper);
+    let bulge = 2.0 * spread(e, vec3f(all.x, 0.0, all.y)) - (2.0 - rise) * spread(e, c);
+    let depth = 10.0 * dot(e.recede * e.recede, all - c.xz);
+    return e.incident.z * e.nearness * e.nearness * e.nearness * (1.0 + bulge) / (cosine * (1.0 + depth));
 }
 
 struct Within {
@@ -269,21 +336,19 @@ struct Within {
 }
 
 // Where a lobe and a sender with a contour meet, and the contour's slopes there.
-fn within(disk: Disk, c: Contour, outgoing: vec3f, stretch: vec2f, first: Slopes, variance: f32) -> Within {
-    var slopes = first;
-    var middle = slopes.slope * stretch;
-    var outline =
-        Trapezoid(middle, slope_of(slopes, stretch, c.across), slope_of(slopes, stretch, c.along), c.taper);
-    let step = toward_lobe(outline, variance);
-    let incident = normalize(disk.middle + c.across * step.x + c.along * step.y);
-    if incident.z > HORIZON {
-        slopes = slopes_of(incident, outgoing, stretch);
-        middle = slopes.slope * stretch + slope_of(slopes, stretch, disk.middle - incident);
-        outline = Trapezoid(middle, slope_of(slopes, stretch, c.across), slope_of(slopes, stretch, c.along), c.taper);
-    }
-    let weight = slopes.incident.z / disk.mean_cos;
+fn within(disk: Disk, c: Contour, outgoing: vec3f, stretch: vec2f, first: Slopes, variance: f32, rise: f32) -> Within {
+    let across = slope_of(first, stretch, c.across);
+    let seen = Trapezoid(first.slope * stretch, across, slope_of(first, stretch, c.along), c.taper);
+    let e = expansion_of(c, disk.middle, product(seen, variance));
+    let slopes = slopes_of(e.incident, outgoing, stretch);
+    let shrinks = vec2f(e.across.z, e.along.z) * slopes.inv_z;
+    let fall = slope_of_half(slopes, stretch, e.incident);
+    let u = slope_of_half(slopes, stretch, e.across);
+    let v = slope_of_half(slopes, stretch, e.along);
+    let outline = mapped(e, slopes.slope * stretch, shrinks, fall, u, v);
     let tan2 = dot(slopes.slope, slopes.slope);
-    let met = Meeting(slopes.incident, slopes.incident + outgoing, tan2, weight, slopes.square, middle);
+    let weight = weight_of(e, disk.middle.z, rise);
+    let met = Meeting(e.incident, e.incident + outgoing, tan2, weight, slopes.square, outline.middle);
     return Within(met, outline);
 }
 
@@ -302,10 +367,18 @@ fn outline_solved(o: Trapezoid, lobe: f32, share: f32) -> vec3f {
     return vec3f(max(xx * yy - xy * xy, lobe * lobe), yy * m.x - xy * m.y, xx * m.y - xy * m.x);
 }
 
-fn toward_lobe(o: Trapezoid, variance: f32) -> vec2f {
-    let found = outline_solved(o, variance, 1.0);
-    let along = vec2f(dot(o.across, found.yz), dot(o.along, found.yz));
-    return clamp(-variances(o.taper) * along / found.x, vec2f(-1.0), vec2f(1.0));
+fn product(o: Trapezoid, variance: f32) -> Product {
+    let v = variances(o.taper);
+    let uu = variance + v.x * dot(o.across, o.across);
+    let uv = dot(o.across, o.along);
+    let vv = variance + v.y * dot(o.along, o.along);
+    let share = 1.0 / max(uu * vv - v.x * v.y * uv * uv, variance * variance);
+    let m = vec2f(dot(o.middle, o.across), dot(o.middle, o.along));
+    let third = o.taper / 3.0;
+    let t = clamp(v.y * share * (v.x * uv * m.x - uu * m.y), third - 1.0, third + 1.0);
+    let half_ = 1.0 - o.taper * (t - third);
+    let s = clamp(v.x * share * (v.y * uv * m.y - vv * m.x), -half_, half_);
+    return Product(vec2f(s, t), vec3f(v.x * vv, -v.x * v.y * uv, v.y * uu) * (share * variance));
 }
 
 fn scaled(o: Trapezoid, scale: f32) -> Trapezoid {
@@ -428,29 +501,38 @@ fn log_below(x: f32) -> f32 {
     return select(-log(1.0 - x), x * (1.0 + x * (0.5 + x / 3.0)), x < 0.01);
 }
 
+fn phong_over_contour(middle: vec3f, c: Contour, mirror: vec3f, n: f32) -> f32 {
+    let aside = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(mirror.x) > 0.7);
+    let unit = sqrt(0.5 * n);
+    let x = normalize(cross(mirror, aside)) * unit;
+    let y = cross(mirror, x);
+    let across = c.across - middle * dot(middle, c.across);
+    let along = c.along - middle * dot(middle, c.along);
+    let seen = Trapezoid(flat(middle, x, y), flat(across, x, y), flat(along, x, y), c.taper);
+    let e = expansion_of(c, middle, product(seen, 0.5));
+    let apart = mirror - e.incident;
+    let versine = 0.5 * dot(apart, apart);
+    let at = flat(e.incident, x, y) * (1.0 + versine * (0.5 + 0.29 * versine));
+    let outline = mapped(e, at, vec2f(0.0), vec2f(0.0), flat(e.across, x, y), flat(e.along, x, y));
+    return weight_of(e, middle.z, 0.0) * gaussian_over(outline);
+}
+
+fn flat(v: vec3f, x: vec3f, y: vec3f) -> vec2f {
+    return vec2f(dot(x, v), dot(y, v));
+}
+
 fn phong(disk: Disk, c: Contour, mirror: vec3f, n: f32) -> f32 {
     let apart = mirror - disk.middle;
     let versine = 0.5 * dot(apart, apart);
     if versine >= 1.0 {
         return 0.0;
     }
+    if disk.radius2 > 0.0 && shows(c, disk.middle, sqrt(0.5 / n)) {
+        return phong_over_contour(disk.middle, c, mirror, n);
+    }
     let exponent = n * log_below(versine);
     if disk.radius2 == 0.0 {
         return exp(-exponent);
-    }
-    if shows(c, disk.middle, sqrt(0.5 / n)) {
-        let aside = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(mirror.x) > 0.7);
-        let x = normalize(cross(mirror, aside));
-        let y = cross(mirror, x);
-        let unit = sqrt(0.5 * n);
-        let off = vec2f(dot(x, disk.middle), dot(y, disk.middle));
-        let middle = off * (sqrt(exponent) / max(length(off), 1e-20));
-        let across = vec2f(dot(x, c.across), dot(y, c.across)) * unit;
-        let along = vec2f(dot(x, c.along), dot(y, c.along)) * unit;
-        let outline = Trapezoid(middle, across, along, c.taper);
-        let step = toward_lobe(outline, 0.5);
-        let met = normalize(disk.middle + c.across * step.x + c.along * step.y);
-        return met.z / disk.mean_cos * gaussian_over(outline);
     }
     let share = 0.25 * disk.radius2 * n;
     let step = min(share / (1.0 + share), sqrt(disk.radius2 / (2.0 * max(versine, 1e-30))));
@@ -473,7 +555,7 @@ fn ward(disk: Disk, c: Contour, outgoing: vec3f, alpha: f32, stretch: vec2f) -> 
         return exp(-dot(stretched, stretched) / alpha2) * (1.0 + tan2) * first.inv_z * first.inv_z;
     }
     if shows(c, disk.middle, alpha / max(stretch.x, stretch.y)) {
-        let met = within(disk, c, outgoing, stretch, first, 0.5 * alpha2);
+        let met = within(disk, c, outgoing, stretch, first, 0.5 * alpha2, 0.75);
         let factor = met.meeting.weight * (1.0 + met.meeting.tan2) / (met.meeting.h.z * met.meeting.h.z);
         return factor * gaussian_over(scaled(met.outline, 1.0 / alpha));
     }
@@ -515,7 +597,7 @@ fn ggx(disk: Disk, c: Contour, outgoing: vec3f, alpha: f32) -> vec3f {
     let width2 = alpha2 + dot(first.slope, first.slope);
     let variance = 0.25 * width2;
     if shows(c, disk.middle, sqrt(width2)) {
-        let met = within(disk, c, outgoing, vec2f(1.0), first, variance);
+        let met = within(disk, c, outgoing, vec2f(1.0), first, variance, 1.0);
         let density = ggx_over(scaled(met.outline, 1.0 / alpha)) / (PI * alpha2);
         return vec3f(at_meeting(met.meeting, density, alpha2, outgoing), schlick(met.meeting.h), schlick(h));
     }
