@@ -438,7 +438,7 @@ impl Place {
     }
 
     /// The same of a sender that is far, by what arrives in the middle.
-    fn from_afar<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
+    fn by_middle<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
         let (x, n, _) = self.middle;
         let value = light.arriving_at(x, n, link.sender, self.negligible).0.element_sum();
         if light.element(self.node).is_patch() || light.elements.is_distant(NodeId(link.sender)) {
@@ -510,7 +510,7 @@ impl Place {
         } else if !far && (!element.is_patch() || mean * visible > self.much) {
             self.varying(light, link)
         } else if flat || !element.is_patch() {
-            self.from_afar(light, link)
+            self.by_middle(light, link)
         } else {
             let direction = light.direction_to(element.center, link.sender);
             let (irradiance, _) = light.arriving_at(element.center, direction, link.sender, self.negligible);

@@ -12,6 +12,7 @@
 //! do not see the eye are bent until they just do, and no light passes below the true surface.
 
 mod emitters;
+mod groups;
 mod nearby;
 mod sampler;
 #[cfg(test)]
@@ -23,6 +24,7 @@ pub use sampler::Sampler;
 
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::{Place as Frame, Reflector};
+use groups::MOST_GROUPS;
 use hr_diffuse::sampling::hash;
 use hr_diffuse::visibility::NO_BLOCKER;
 use hr_diffuse::{Geometry, Hit, Normalization, Rgb, SolveError, Visibility};
@@ -44,8 +46,6 @@ const MOST_SURVIVAL: f32 = 0.95;
 const LEAST_ALBEDO: f32 = 0.05;
 /// Emitters among which one is picked at each point of a path.
 const CANDIDATES: u32 = 4;
-/// Of so many emitters each is looked at for what is in lobes that are followed.
-const FEW: usize = 16;
 /// Step from one candidate's place on its emitter to the next one's: the two-dimensional golden ratio, as in
 /// [`hr_diffuse::sampling`].
 const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
@@ -332,16 +332,13 @@ impl<'a> PathTracer<'a> {
     ) -> Rgb {
         let Some(point) = self.point(hit, direction) else { return Rgb::ZERO };
         let point = Point { diffuse: Rgb::ZERO, chances: [0.0, 1.0, 0.0], ..point };
-        let (draws, mut light) = if self.emitters.len() <= FEW {
-            (Draws::Each, self.direct_of_each(&point, choice.x, place))
-        } else {
-            (Draws::ByPower, self.direct(&point, [choice.x, choice.y], place, &(), None, 0))
-        };
+        let mut light = self.direct_of_groups(&point, choice, place);
         for turn in turns {
             let Some(step) = point.step(0.0, *turn) else { continue };
             let met = self.visibility.closest_except(point.position, step.direction, START, f32::MAX, point.surface);
             let Some(met) = met else { continue };
-            let emitted = self.emitted(&met) * self.share_of_emission(&met, step.direction, step.density, draws);
+            let emitted =
+                self.emitted(&met) * self.share_of_emission(&met, step.direction, step.density, Draws::OfGroups);
             light += step.weight * (emitted + beyond(&met, step.direction)) / turns.len() as f32;
         }
         light
@@ -453,23 +450,21 @@ impl<'a> PathTracer<'a> {
         if blocked { Rgb::ZERO } else { light }
     }
 
-    /// Radiance that a point reflects of the light of each emitter, where these are few. The strongest few are looked at, were
-    /// nothing between, of the others one here and there.
-    fn direct_of_each(&self, point: &Point, choice: f32, place: Vec2) -> Rgb {
+    /// Radiance that a point reflects of the light of one emitter of each group. The strongest few are looked at, were nothing
+    /// between, of the others one here and there.
+    fn direct_of_groups(&self, point: &Point, choice: Vec2, place: Vec2) -> Rgb {
         let geometries = self.visibility.geometries();
-        let mut lights = [None; FEW];
-        for (entry, slot) in (0..self.emitters.len() as u32).zip(&mut lights) {
-            let place = (place + STEP * entry as f32).fract();
-            let Some(arrival) = self.emitters.shine(geometries, point.position, entry, place, 1.0) else { continue };
+        let mut lights = [None; MOST_GROUPS];
+        for (number, arrival) in self.emitters.draw_of_groups(geometries, point.position, choice.y, place) {
             let light = point.reflected(&arrival) * arrival.irradiance;
             let strength = light.abs().element_sum();
-            *slot = (strength > 0.0).then_some((arrival, light, strength));
+            lights[number] = (strength > 0.0).then_some((arrival, light, strength));
         }
-        let total: f32 = lights.iter().flatten().map(|(_, _, strength)| strength).sum();
+        let total: f32 = lights.iter().flatten().map(|(.., strength)| strength).sum();
         let mut sum = Rgb::ZERO;
         for (number, (arrival, light, strength)) in lights.iter().flatten().enumerate() {
             let chance = (CANDIDATES as f32 * strength / total).min(1.0);
-            if (choice + STEP.x * number as f32).fract() >= chance {
+            if (choice.x + STEP.x * number as f32).fract() >= chance {
                 continue;
             }
             let ends = [point.surface, arrival.surface.unwrap_or(NO_BLOCKER)];

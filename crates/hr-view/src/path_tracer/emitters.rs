@@ -1,6 +1,8 @@
 //! All that light is drawn from: surfaces that emit, by their power, lights without extent, and, where a solution knows
 //! them, parts of surfaces that reflect so much that rays which meet them by chance would be noise.
 
+use super::STEP;
+use super::groups::Groups;
 use super::nearby::Nearby;
 use glam::{Vec2, Vec3};
 use hr_diffuse::beams::spot_ramp;
@@ -23,6 +25,8 @@ pub struct Emitters {
     glowing: usize,
     /// How many are drawn at a time.
     candidates: u32,
+    /// All but those that glow.
+    groups: Groups,
 }
 
 /// One thing that emits.
@@ -65,8 +69,8 @@ pub enum Draws<'a> {
     ByPower,
     /// By what is known of those nearby.
     Nearby(&'a Nearby),
-    /// Each of them.
-    Each,
+    /// One of each group of neighbours.
+    OfGroups,
 }
 
 impl<'a> From<Option<&'a Nearby>> for Draws<'a> {
@@ -141,6 +145,16 @@ impl Emitters {
         let first = found.len();
         let power = |glow: &Glow| glow.radiance.element_sum() * PI * glow.area;
         found.extend(glowing.iter().map(|glow| (Source::Surface(*glow), power(glow))));
+        let middle = |source: &Source| match source {
+            Source::Surface(glow) => {
+                let geometry = &geometries[glow.surface as usize];
+                geometry.point(geometry.middle(glow.domain))
+            }
+            Source::Sphere { center, .. } => *center,
+            Source::Light { light: Light { kind: LightKind::Directional { direction }, .. }, .. } => -FAR * *direction,
+            Source::Light { position, .. } => *position,
+        };
+        let grouped: Vec<(Vec3, f32)> = found[..first].iter().map(|(source, power)| (middle(source), *power)).collect();
         let total: f32 = found.iter().map(|(_, power)| power).sum();
         let (mut entries, mut chances, mut sum) = (Vec::new(), Vec::new(), 0.0);
         let mut entry_of = vec![u32::MAX; geometries.len()];
@@ -156,7 +170,7 @@ impl Emitters {
             entries.push(Entry { source, chance });
             chances.push(sum);
         }
-        Self { entries, chances, entry_of, glowing: first, candidates }
+        Self { entries, chances, entry_of, glowing: first, candidates, groups: Groups::new(&grouped) }
     }
 
     /// How many there are.
@@ -195,7 +209,7 @@ impl Emitters {
         match draws {
             Draws::ByPower => by_power,
             Draws::Nearby(nearby) => nearby.chance(entry, by_power),
-            Draws::Each => 1.0,
+            Draws::OfGroups => self.groups.chance(entry),
         }
     }
 
@@ -222,6 +236,22 @@ impl Emitters {
         let entry = nearby.pick(choice).or_else(|rest| by_power(rest).ok_or(())).ok()?;
         let arrival = self.shine(geometries, at, entry, u, self.chance(entry, Draws::Nearby(nearby)))?;
         Some(Arrival { seen: nearby.seen(entry), ..arrival })
+    }
+
+    /// Draws light of one emitter of each group that may arrive at `at`, with the group's number: numbers in 0…1, which the groups share
+    /// by steps, pick the emitter and the place on it. Those that glow are in no group.
+    pub fn draw_of_groups(
+        &self,
+        geometries: &[Geometry],
+        at: Vec3,
+        choice: f32,
+        u: Vec2,
+    ) -> impl Iterator<Item = (usize, Arrival)> {
+        let drawn = self.groups.draw(move |number| (choice + STEP.y * number as f32).fract());
+        drawn.enumerate().filter_map(move |(number, entry)| {
+            let u = (u + STEP * number as f32).fract();
+            Some((number, self.shine(geometries, at, entry, u, self.groups.chance(entry))?))
+        })
     }
 
     /// The light of one emitter that is drawn with a chance.
