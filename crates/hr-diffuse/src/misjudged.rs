@@ -5,6 +5,7 @@
 //! of the same clusters, of which most are well judged: so it is found out once for all where they may not be.
 
 use crate::hierarchy::{Elements, Kind};
+use crate::hooks::FLAT_COSINE;
 use crate::threads::prelude::*;
 use crate::transport::Exitant;
 use crate::{Facing, Rgb};
@@ -29,8 +30,10 @@ impl Misjudged {
         let judge = |node: usize| {
             // What is pure metal has no diffuse light, nor has any part of it.
             let is_bright = exitant.radiosity[node] != Rgb::ZERO;
-            let is_cluster = elements.nodes[node].kind == Kind::Cluster;
-            if is_cluster && is_bright { regions(elements, exitant, node) } else { 0 }
+            let element = &elements.nodes[node];
+            // Of flat sets moments tell all: a finely cut floor is looked at for nothing.
+            let is_bent = element.kind == Kind::Cluster && element.normals.cos_angle <= FLAT_COSINE;
+            if is_bent && is_bright { regions(elements, exitant, node) } else { 0 }
         };
         Self((0..elements.nodes.len()).into_par_iter().with_min_len(64).map(judge).collect())
     }

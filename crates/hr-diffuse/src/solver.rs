@@ -414,6 +414,8 @@ impl<L: LightField> Solver<L> {
         let pass = Pass { number: 1, tolerance, reflects: true, closely: true };
         let prepared = self.prepared;
         if !prepared {
+            // Nothing is refined here, before which clusters are judged.
+            self.exitant.misjudged = Misjudged::new(&self.elements, &self.exitant);
             self.prepare_watched(pass, stopped, watch);
         }
         self.expect_in_proportion(pass, stopped, watch);
@@ -745,7 +747,6 @@ impl<L: LightField> Solver<L> {
     pub(crate) fn prepare(&mut self, tolerance: Option<f32>, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         let start = Instant::now();
         self.shown.clear();
-        self.exitant.misjudged = Misjudged::new(&self.elements, &self.exitant);
         let error = tolerance.map(|tolerance| if self.skips.faint_links { tolerance } else { 0.0 });
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
         let known = tolerance.and_then(|_| self.kept_weights.take());
