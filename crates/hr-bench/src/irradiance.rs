@@ -271,9 +271,11 @@ fn overlap(solution: &Solution, corners: &[DVec3; 3], normal: DVec3, fronts_only
                 let point = corners[0] + along * middle.x + across * middle.y;
                 let shown = solution.irradiance(leaf, geometry.parameters_of(point.as_vec3()));
                 let reflectance = solution.elements.nodes[leaf.index()].reflectance;
-                found.radiosity += area * solution.exitant.radiosity[leaf.index()].as_dvec3();
-                found.irradiance += area * solution.exitant.irradiance[leaf.index()].as_dvec3();
-                found.shown += area * (reflectance * shown).as_dvec3();
+                // What something covers is dark in the reference; a leaf's light is that of the rest of it.
+                let open = area * f64::from(solution.elements.exposed(leaf.0));
+                found.radiosity += open * solution.exitant.radiosity[leaf.index()].as_dvec3();
+                found.irradiance += open * solution.exitant.irradiance[leaf.index()].as_dvec3();
+                found.shown += open * (reflectance * shown).as_dvec3();
             }
         };
         let mut pending = vec![solution.elements.surface_nodes[surface][usize::from(back)]];

@@ -21,7 +21,7 @@ use std::ops::ControlFlow;
 pub(crate) struct Doubt {
     /// How far (standard deviation) all the light that there is may be off, …
     whole: f64,
-    /// … and that of each part from its whole's.
+    /// … and that of each part from its whole's; further where observations tell that parts differ by more.
     part: f64,
     /// Variance of a single observation: at least so much.
     noise: f64,
@@ -30,16 +30,33 @@ pub(crate) struct Doubt {
 /// Of what vertices gather, against the light of the leaves around.
 pub(crate) const OF_VERTICES: Doubt = Doubt { whole: 0.1, part: 0.05, noise: 0.2 };
 /// Of what links bring, against single rays.
-const OF_LINKS: Doubt = Doubt { whole: 0.1, part: 0.03, noise: 0.25 };
+const OF_LINKS: Doubt = Doubt { whole: 0.1, part: 0.03, noise: 0.05 };
 
 /// Light is changed by no more than this factor, …
-const MOST: f64 = 1.2;
-/// … and by less where more than this share of it is reflected, in proportion to what is not. So rows of form factors times
+const MOST: f64 = 1.8;
+/// … and by less where much of it is reflected: of what is absorbed at least this share still is. So rows of form factors times
 /// reflectance stay below 1 if they were before. Within that what was found counts there as anywhere: what is wrong is repeated many
 /// times, and that the rows' sums are right does not tell which of what is seen is bright.
-const REFLECTED: f64 = 0.8;
+const ABSORBED: f64 = 0.2;
+/// That parts differ by as much as is believed counts as so many of them that are known for certain.
+const BELIEVED_PARTS: f64 = 10.0;
+/// A part tells of no larger (squared) relative difference from its whole: where next to nothing is brought anything may be found.
+const MOST_APART: f64 = 0.1;
+/// Parts differ by no more than so many times (squared) what is believed.
+const MOST_SPREAD: f64 = 100.0;
 /// Places that a thread looks from between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 64;
+
+/// What rays from a place are expected to find of reflected light, as links bring it (sum of channels).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Expected {
+    /// The node.
+    pub(crate) place: u32,
+    /// On average …
+    pub(crate) mean: f32,
+    /// … and the mean of its square: few rays see what is small and bright, and those that do not do not know of it.
+    pub(crate) square: f32,
+}
 
 /// Sums over observations: of what was found, of what is compared with it, and of the squares.
 #[derive(Clone, Copy, Debug, Default)]
@@ -49,12 +66,14 @@ pub(crate) struct Sums {
     found2: f64,
     both: f64,
     brought2: f64,
+    /// Of the variance that is expected of what is found.
+    variance: f64,
 }
 
 impl Sums {
-    /// Those of one observation.
-    pub(crate) fn of(found: f64, brought: f64) -> Self {
-        Self { found, brought, found2: found * found, both: found * brought, brought2: brought * brought }
+    /// Those of one observation of some variance, as far as that is known.
+    pub(crate) fn of(found: f64, brought: f64, variance: f64) -> Self {
+        Self { found, brought, found2: found * found, both: found * brought, brought2: brought * brought, variance }
     }
 
     fn add(&mut self, other: &Self) {
@@ -63,6 +82,7 @@ impl Sums {
         self.found2 += other.found2;
         self.both += other.both;
         self.brought2 += other.brought2;
+        self.variance += other.variance;
     }
 
     /// What is found over what is brought, and the variance of that.
@@ -70,48 +90,48 @@ impl Sums {
         let ratio = self.found / self.brought;
         let off2 = self.found2 - 2.0 * ratio * self.both + ratio * ratio * self.brought2;
         // A few may agree by chance.
-        let variance = (off2.max(0.0) + noise * self.brought2) / (self.brought * self.brought);
+        let variance = (off2.max(self.variance) + noise * self.brought2) / (self.brought * self.brought);
         (ratio.is_finite() && variance.is_finite()).then_some((ratio, variance))
     }
 }
 
-/// Factors for reflected light, in the order of the places in `brought`, each with what links bring of it (sum of channels); from so
-/// many rays, and how many were shot. `None` where `watch` breaks.
+/// Factors for reflected light, in the order of the places in `expected`; from so many rays, and how many were shot. `None` where `watch` breaks.
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
-    brought: &[(u32, f32)],
+    expected: &[Expected],
     rays: usize,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<(Vec<f32>, u64)> {
-    let weight = |&(place, brought): &(u32, f32)| {
-        let element = light.element(place);
-        let counts = brought > 0.0 && light.elements.exposed(place) >= 1.0;
+    let weight = |of: &Expected| {
+        let element = light.element(of.place);
+        let counts = of.mean > 0.0 && light.elements.exposed(of.place) >= 1.0;
         if counts { f64::from(element.area * element.importance) } else { 0.0 }
     };
     let (mut area, mut power) = (0.0, 0.0);
-    for place in brought {
-        area += weight(place);
-        power += weight(place) * f64::from(place.1);
+    for of in expected {
+        area += weight(of);
+        power += weight(of) * f64::from(of.mean);
     }
     let mean = power / area;
     let total = 2.0 * power;
     if !(total > 0.0 && total.is_finite()) {
-        return Some((vec![1.0; brought.len()], 0));
+        return Some((vec![1.0; expected.len()], 0));
     }
     // How many rays start from each place, and what each of them counts.
     let mut sum = 0.0_f64;
-    let counts: Vec<(u32, f64)> = brought
+    let counts: Vec<(u32, f64)> = expected
         .iter()
-        .map(|place| {
-            let share = weight(place) * (mean + f64::from(place.1)) / total * rays as f64;
+        .map(|of| {
+            let share = weight(of) * (mean + f64::from(of.mean)) / total * rays as f64;
             let first = sum.round() as u64;
             sum += share;
             let count = (sum.round() as u64 - first) as u32;
-            (count, if share > 0.0 { weight(place) / share } else { 0.0 })
+            (count, if share > 0.0 { weight(of) / share } else { 0.0 })
         })
         .collect();
     let look = |index: usize| {
-        let ((place, brought), (count, each)) = (brought[index], counts[index]);
+        let (Expected { place, mean, square }, (count, each)) = (expected[index], counts[index]);
+        let variance = each * each * (f64::from(square) - f64::from(mean) * f64::from(mean)).max(0.0);
         let seed = hash(place, 0x1c0d);
         let mut sums = Sums::default();
         for ray in 0..count {
@@ -119,25 +139,25 @@ pub(crate) fn calibrate<L: LightField>(
             let on = (unit(hash(hash(seed, 0x53), ray)), Vec2::new(u.z, u.w));
             let Some((x, n, surface)) = receiving_point(light, place, on) else { continue };
             let found = reflected_along(light, x, cosine_direction(n, u.x, u.y), surface);
-            sums.add(&Sums::of(each * f64::from(found), each * f64::from(brought)));
+            sums.add(&Sums::of(each * f64::from(found), each * f64::from(mean), variance));
         }
         sums
     };
-    let mut found: Vec<Sums> = Vec::with_capacity(brought.len());
-    while found.len() < brought.len() {
+    let mut found: Vec<Sums> = Vec::with_capacity(expected.len());
+    while found.len() < expected.len() {
         if watch().is_break() {
             return None;
         }
-        let part = found.len()..brought.len().min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
+        let part = found.len()..expected.len().min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
         found.par_extend(part.into_par_iter().with_min_len(8).map(look));
     }
-    let factors = factors(light.elements, brought.iter().map(|place| place.0).zip(found), OF_LINKS);
-    let factor = |&(place, _): &(u32, f32)| {
-        let absorbed = (1.0 - f64::from(light.element(place).importance)) / (1.0 - REFLECTED);
-        let most = 1.0 + (MOST - 1.0) * absorbed.clamp(0.0, 1.0);
+    let factors = factors(light.elements, expected.iter().map(|of| of.place).zip(found), OF_LINKS);
+    let factor = |&Expected { place, .. }: &Expected| {
+        let reflected = f64::from(light.element(place).importance);
+        let most = ((1.0 - ABSORBED * (1.0 - reflected)) / reflected).clamp(1.0, MOST);
         factors[place as usize].clamp(most.recip(), most) as f32
     };
-    Some((brought.iter().map(factor).collect(), counts.iter().map(|(count, _)| u64::from(*count)).sum()))
+    Some((expected.iter().map(factor).collect(), counts.iter().map(|(count, _)| u64::from(*count)).sum()))
 }
 
 /// By node, what is found over what it is compared with, by the observations at leaves or places: of each part as of its whole, as far as
@@ -152,22 +172,23 @@ pub(crate) fn factors(elements: &Elements, found: impl Iterator<Item = (u32, Sum
         let sum = sums[node];
         sums[nodes[node].parent as usize].add(&sum);
     }
+    let spreads = spreads(elements, &sums, doubt);
     let mut factors = vec![1.0_f64; nodes.len()];
     let mut ratios = vec![1.0_f64; nodes.len()];
     // What tells a part from its whole is the difference of what was found: the whole has been told already.
-    let told = |sums: &Sums, (factor, ratio): (f64, f64), off: f64| match sums.ratio(doubt.noise) {
+    let told = |sums: &Sums, (factor, ratio): (f64, f64), spread: f64| match sums.ratio(doubt.noise) {
         Some((own, variance)) => {
-            let prior = (off * ratio).powi(2);
+            let prior = spread * ratio * ratio;
             (factor + (own - ratio) * prior / (prior + variance).max(f64::MIN_POSITIVE), own)
         }
         None => (factor, ratio),
     };
-    (factors[0], ratios[0]) = told(&sums[0], (1.0, 1.0), doubt.whole);
+    (factors[0], ratios[0]) = told(&sums[0], (1.0, 1.0), doubt.whole.powi(2));
     for (node, element) in nodes.iter().enumerate() {
         let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
         let (mut brought, mut changed) = (0.0, 0.0);
         for child in children.clone() {
-            (factors[child], ratios[child]) = told(&sums[child], (factors[node], ratios[node]), doubt.part);
+            (factors[child], ratios[child]) = told(&sums[child], (factors[node], ratios[node]), spreads[node]);
             brought += sums[child].brought;
             changed += sums[child].brought * factors[child];
         }
@@ -178,6 +199,42 @@ pub(crate) fn factors(elements: &Elements, found: impl Iterator<Item = (u32, Sum
         }
     }
     factors
+}
+
+/// By node, the variance of its parts' ratios, relative to its own squared, as observations below it tell; as far as these say
+/// little, that of what it is a part of.
+///
+/// A part whose ratio is r, of a whole of r', tells (r / r' - 1)² less what its noise makes of that, weighted by how well it knows it
+/// (the moment estimator of R. DerSimonian and N. Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7, 1986).
+fn spreads(elements: &Elements, sums: &[Sums], doubt: Doubt) -> Vec<f64> {
+    let nodes = &elements.nodes;
+    let believed = doubt.part.powi(2);
+    let ratios: Vec<Option<(f64, f64)>> = sums.iter().map(|sums| sums.ratio(doubt.noise)).collect();
+    // By node, weighted sums over all parts below it, and of the weights.
+    let mut told = vec![[0.0_f64; 2]; nodes.len()];
+    for node in (1..nodes.len()).rev() {
+        let parent = nodes[node].parent as usize;
+        if let (Some((own, variance)), Some((whole, _))) = (ratios[node], ratios[parent]) {
+            let variance = variance / (whole * whole);
+            // As far as it is the whole itself it does not differ.
+            let rest = 1.0 - sums[node].brought / sums[parent].brought;
+            let weight = (believed + variance).powi(-2);
+            if weight > 0.0 && variance.is_finite() && rest > 0.0 {
+                told[node][0] += weight * ((own / whole - 1.0).powi(2).min(MOST_APART) - rest * variance);
+                told[node][1] += weight * rest;
+            }
+        }
+        let [apart, weight] = told[node];
+        told[parent][0] += apart;
+        told[parent][1] += weight;
+    }
+    let prior = BELIEVED_PARTS * believed.powi(-2);
+    let mut spreads = vec![believed; nodes.len()];
+    for (node, [apart, weight]) in told.into_iter().enumerate() {
+        let of_whole = if node == 0 { believed } else { spreads[nodes[node].parent as usize] };
+        spreads[node] = ((apart + prior * of_whole) / (weight + prior)).clamp(believed, MOST_SPREAD * believed);
+    }
+    spreads
 }
 
 #[cfg(test)]
@@ -217,14 +274,15 @@ mod tests {
     /// Factors by leaf, where links bring the leaves this share of what they should.
     fn factors(solver: &Solver, share: impl Fn(u32) -> f32, rays: usize) -> (Vec<u32>, Vec<f32>) {
         let light = solver.light();
-        let mut brought = solver.gather.diffuse(light, &solver.links);
-        for (leaf, brought) in &mut brought {
-            *brought *= share(*leaf);
+        let mut expected = solver.gather.expected(light, &solver.links);
+        for Expected { place, mean, square } in &mut expected {
+            *mean *= share(*place);
+            *square *= share(*place) * share(*place);
         }
         let watch = &mut || ControlFlow::Continue(());
-        let (factors, shot) = calibrate(light, &brought, rays, watch).expect("nobody breaks");
+        let (factors, shot) = calibrate(light, &expected, rays, watch).expect("nobody breaks");
         assert!(shot.abs_diff(rays as u64) < 2, "{shot} rays of {rays}");
-        (brought.into_iter().map(|leaf| leaf.0).collect(), factors)
+        (expected.into_iter().map(|of| of.place).collect(), factors)
     }
 
     #[test]
@@ -250,7 +308,7 @@ mod tests {
             for ray in 0..8 {
                 // All that is seen of the dim ones is in one ray of eight.
                 let found = if i.is_multiple_of(2) { 1.0 } else { f64::from(u8::from(ray == 0)) * 8.0 * 0.3 };
-                sums[leaf as usize].add(&Sums::of(found, brought(i)));
+                sums[leaf as usize].add(&Sums::of(found, brought(i), 0.0));
             }
         }
         let found = leaves().map(|(_, leaf)| (leaf, sums[leaf as usize]));
@@ -263,18 +321,62 @@ mod tests {
         assert!((after / before - factors[0]).abs() < 1e-6, "{}, not {}", after / before, factors[0]);
     }
 
+    /// Of what a part of a surface lacks more is believed where others near it differ as much: 30 % here, and 3 % are expected.
+    #[test]
+    fn parts_that_differ_tell_that_others_do() {
+        let solver = room(0.5);
+        let off = |differ: bool| {
+            let found = solver.elements.patch_leaves().enumerate().map(|(i, leaf)| {
+                let ratio = if !differ {
+                    1.0
+                } else if i.is_multiple_of(2) {
+                    1.3
+                } else {
+                    0.7
+                };
+                // One leaf knows less than others, and lacks half.
+                let (count, ratio) = if i == 5 { (20, 0.5) } else { (200, ratio) };
+                let mut sums = Sums::default();
+                (0..count).for_each(|ray| sums.add(&Sums::of(if ray % 2 == 0 { 2.0 * ratio } else { 0.0 }, 1.0, 1.0)));
+                (leaf, sums)
+            });
+            let leaf = solver.elements.patch_leaves().nth(5).expect("there are more");
+            1.0 - super::factors(&solver.elements, found, OF_LINKS)[leaf as usize]
+        };
+        let [alone, among_others] = [false, true].map(off);
+        assert!(alone < 0.03, "it may be chance: {alone}");
+        assert!(among_others > 0.08 && among_others > 3.0 * alone, "it is as others are: {among_others}, not {alone}");
+    }
+
+    /// Rays that miss what is small and bright do not know better.
+    #[test]
+    fn what_rays_may_miss_is_kept() {
+        let solver = room(0.5);
+        let factor = |variance: f64| {
+            let found = solver.elements.patch_leaves().map(|leaf| {
+                let mut sums = Sums::default();
+                (0..10).for_each(|_| sums.add(&Sums::of(0.5, 1.0, variance)));
+                (leaf, sums)
+            });
+            super::factors(&solver.elements, found, OF_LINKS)[0]
+        };
+        let few = solver.elements.patch_leaves().count() as f64 * 10.0;
+        let (sure, unsure) = (factor(0.0), factor(few));
+        assert!(sure < 0.6 && unsure > 0.98, "{sure}, {unsure}");
+    }
+
     /// An extension's light is compared, too.
     #[test]
     fn nothing_changes_where_nothing_is_missing() {
         let solver = room_with(0.5, Echo { material: 0, albedo: 0.05, errs: false });
-        let (light, brought) = (solver.light(), solver.gather.reflected(solver.light(), &solver.links));
+        let (light, expected) = (solver.light(), solver.gather.expected(solver.light(), &solver.links));
         let (factors, _) =
-            calibrate(light, &brought, 200_000, &mut || ControlFlow::Continue(())).expect("nobody breaks");
+            calibrate(light, &expected, 200_000, &mut || ControlFlow::Continue(())).expect("nobody breaks");
         let sum = |of: &dyn Fn(usize) -> f32| {
-            let weight = |(i, &(leaf, _)): (usize, &(u32, f32))| light.element(leaf).area * of(i);
-            brought.iter().enumerate().map(weight).sum::<f32>()
+            let weight = |(i, expected): (usize, &Expected)| light.element(expected.place).area * of(i);
+            expected.iter().enumerate().map(weight).sum::<f32>()
         };
-        let mean = sum(&|i| factors[i] * brought[i].1) / sum(&|i| brought[i].1);
+        let mean = sum(&|i| factors[i] * expected[i].mean) / sum(&|i| expected[i].mean);
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
     }
 
@@ -297,7 +399,8 @@ mod tests {
     fn where_no_light_is_reflected_nothing_changes() {
         let solver = room(0.0);
         let light = solver.light();
-        let nothing: Vec<(u32, f32)> = light.elements.patch_leaves().map(|leaf| (leaf, 0.0)).collect();
+        let nothing = |place| Expected { place, mean: 0.0, square: 0.0 };
+        let nothing: Vec<Expected> = light.elements.patch_leaves().map(nothing).collect();
         let answer = calibrate(light, &nothing, 100, &mut || ControlFlow::Continue(()));
         assert_eq!(answer, Some((vec![1.0; nothing.len()], 0)));
     }

@@ -1,7 +1,7 @@
 //! Gather: every receiver adds up what its links carry.
 
 use crate::Rgb;
-use crate::calibrate::calibrate;
+use crate::calibrate::{Expected, calibrate};
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::{LightField, NodeId, Transfer};
 use crate::inherited::Carried;
@@ -138,17 +138,17 @@ impl Gather {
         rays_each: usize,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> u64 {
-        let mut brought = self.reflected(light, links);
+        let mut expected = self.expected(light, links);
         if light.element(0).active {
             // Where lobes make much of what arrives few rays see their peaks.
-            for ((_, brought), (_, diffuse)) in brought.iter_mut().zip(self.diffuse(light, links)) {
-                *brought = if diffuse >= MOSTLY_DIFFUSE * *brought { *brought } else { 0.0 };
+            for (expected, diffuse) in expected.iter_mut().zip(self.diffuse(light, links)) {
+                expected.mean = if diffuse >= MOSTLY_DIFFUSE * expected.mean { expected.mean } else { 0.0 };
             }
         }
         let places = self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count();
-        let Some((factors, rays)) = calibrate(light, &brought, rays_each * places, watch) else { return 0 };
-        for ((row, factor), (_, brought)) in self.rows.iter_mut().zip(factors).zip(brought) {
-            if brought > 0.0 {
+        let Some((factors, rays)) = calibrate(light, &expected, rays_each * places, watch) else { return 0 };
+        for ((row, factor), expected) in self.rows.iter_mut().zip(factors).zip(expected) {
+            if expected.mean > 0.0 {
                 row[Group::Rest as usize] *= factor;
                 row[Group::Faint as usize] *= factor;
             }
@@ -161,32 +161,37 @@ impl Gather {
         !self.push.places.nodes.is_empty() && self.groups.len() == links.all().len()
     }
 
-    /// By leaf, what arrives there of light that has been reflected (sum of channels).
-    pub(crate) fn indirect<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
+    /// By leaf, what arrives there of light that has been reflected.
+    pub(crate) fn indirect<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, Rgb)> {
         let shares = light.reflected_shares();
-        let indirect = |link: &Link, spread| carried(light, link, spread).element_sum() * shares[link.sender as usize];
+        let indirect = |link: &Link, spread| carried(light, link, spread) * shares[link.sender as usize];
         let on_leaves = self.on_leaves(light, links, &self.carried(links, indirect));
-        on_leaves.into_iter().map(|(leaf, indirect)| (leaf, indirect.max(0.0))).collect()
+        on_leaves.into_iter().map(|(leaf, indirect)| (leaf, indirect.max(Rgb::ZERO))).collect()
     }
 
-    /// By place, what arrives there of light that has been reflected (sum of channels).
-    pub(crate) fn reflected<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
+    /// By place, what rays from there are expected to find of light that has been reflected.
+    pub(crate) fn expected<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<Expected> {
         let shares = light.reflected_shares();
-        let reflected = self.by_place(light, links, |link, spread| {
-            carried(light, link, spread).element_sum() * shares[link.sender as usize]
-        });
-        self.push.places.nodes.iter().copied().zip(reflected).collect()
+        let reflected = self
+            .carried(links, |link, spread| carried(light, link, spread).element_sum() * shares[link.sender as usize]);
+        // Light e through a share f of the view is read by that share of all rays, and is e / f then.
+        let mut squares = self.carried(links, |link, spread| share(light, link, spread));
+        for (square, reflected) in squares.iter_mut().zip(&reflected) {
+            *square = if *square > 0.0 { reflected * reflected / *square } else { 0.0 };
+        }
+        let [means, squares] = [reflected, squares].map(|carried| self.on_places(light, links, &carried));
+        let expected = |(&place, (mean, square))| Expected { place, mean, square };
+        self.push.places.nodes.iter().zip(means.into_iter().zip(squares)).map(expected).collect()
     }
 
     /// By place, what arrives there of light that has been reflected diffusely (sum of channels).
-    pub(crate) fn diffuse<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<(u32, f32)> {
+    pub(crate) fn diffuse<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<f32> {
         let shares = light.reflected_shares();
-        let diffuse = self.by_place(light, links, |link, spread| {
+        self.by_place(light, links, |link, spread| {
             let away = -light.direction_to(light.element(link.receiver).center, link.sender);
             let factor = link.factor * visible(link, spread) * shares[link.sender as usize];
             light.diffuse(link.sender, away).element_sum() * factor
-        });
-        self.push.places.nodes.iter().copied().zip(diffuse).collect()
+        })
     }
 
     /// By place, the sum of what `of` says of senders with extent, times form factors and visibility.
@@ -209,8 +214,12 @@ impl Gather {
         links: &Links,
         of: impl Fn(&Link, Spread) -> f32 + Sync,
     ) -> Vec<f32> {
-        let carried = self.carried(links, of);
-        let sums = self.push.sums(light, links, (&self.groups, &carried));
+        self.on_places(light, links, &self.carried(links, of))
+    }
+
+    /// By place, what arrives there of what links carry.
+    fn on_places<L: LightField>(&self, light: Light<'_, L>, links: &Links, carried: &[f32]) -> Vec<f32> {
+        let sums = self.push.sums(light, links, (&self.groups, carried));
         let brought = |(sums, rows): ([f32; GROUPS], &[f32; GROUPS])| {
             let sum: f32 = sums.iter().zip(rows).map(|(sum, factor)| sum * factor).sum();
             sum.max(0.0)
@@ -219,7 +228,7 @@ impl Gather {
     }
 
     /// By link, what it carries as `of` says.
-    fn carried(&self, links: &Links, of: impl Fn(&Link, Spread) -> f32 + Sync) -> Vec<f32> {
+    fn carried<T: Carried>(&self, links: &Links, of: impl Fn(&Link, Spread) -> T + Sync) -> Vec<T> {
         links.all().par_iter().zip(&self.push.spreads).map(|(link, spread)| of(link, *spread)).collect()
     }
 

@@ -383,6 +383,7 @@ impl Vertices {
         out.put(&self.positions)?;
         out.put(&self.normals)?;
         out.put(&self.irradiance)?;
+        out.put(&self.indirect)?;
         out.put(&self.leaf)?;
         out.put(&self.uv)?;
         out.put(&self.corners)?;
@@ -397,6 +398,7 @@ impl Vertices {
             positions: from.take_finite("vertices")?,
             normals: from.take_finite("normals of vertices")?,
             irradiance: from.take_finite("irradiances of vertices")?,
+            indirect: from.take_finite("indirect irradiances of vertices")?,
             leaf: from.take("leaves of vertices")?,
             uv: from.take_finite("parameters of vertices")?,
             corners: from.take::<Corner>("fans")?,
@@ -406,7 +408,8 @@ impl Vertices {
             first_around: from.take("leaves around vertices")?,
         };
         let count = vertices.positions.len();
-        let lengths = [vertices.normals.len(), vertices.irradiance.len(), vertices.leaf.len(), vertices.uv.len()];
+        let values = [vertices.irradiance.len(), vertices.indirect.len()];
+        let lengths = [vertices.normals.len(), values[0], values[1], vertices.leaf.len(), vertices.uv.len()];
         fits(lengths.iter().all(|&length| length == count), "vertices")?;
         let is_leaf = |&leaf: &u32| {
             elements.nodes.get(leaf as usize).is_some_and(|element| element.is_patch() && element.child_count == 0)

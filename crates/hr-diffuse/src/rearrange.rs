@@ -105,7 +105,7 @@ impl<L: LightField> Solver<L> {
         make_room(&mut exitant.range, || [Rgb::ZERO; 2]);
         make_room(&mut exitant.facing, || Facing::ZERO);
         make_room(&mut exitant.irradiance, || Rgb::ZERO);
-        make_room(&mut exitant.indirect, || 0.0);
+        make_room(&mut exitant.indirect, || Rgb::ZERO);
         make_room(&mut exitant.directional, || Rgb::ZERO);
         make_room(&mut exitant.peak, || 0.0);
         make_room(&mut exitant.gain, || 1.0);
@@ -126,7 +126,7 @@ impl<L: LightField> Solver<L> {
         exitant.range.resize(count, [Rgb::ZERO; 2]);
         exitant.facing.resize(count, Facing::ZERO);
         exitant.irradiance.resize(count, Rgb::ZERO);
-        exitant.indirect.resize(count, 0.0);
+        exitant.indirect.resize(count, Rgb::ZERO);
         exitant.directional.resize(count, Rgb::ZERO);
         exitant.peak.resize(count, 0.0);
         exitant.gain.resize(count, 1.0);

@@ -80,14 +80,13 @@ pub(crate) fn reconstruct<L: LightField>(
     let shares = light.reflected_shares();
     let (spreads, _) = spreads(light, links, Some(error));
     let (from_afar, near) = inherited(light, (links, &spreads, &shares), (&vertices, &places, &gathers));
-    let mut indirect: Vec<f32> = Vec::with_capacity(count);
     for start in (0..count).step_by(chunk) {
         if watch(start as f32 / count as f32).is_break() {
             for vertex in start..count {
-                vertices.irradiance[vertex] = mean_around(light, &vertices, vertex as u32);
+                let mean = mean_around(light, &vertices, vertex as u32);
+                (vertices.irradiance[vertex], vertices.indirect[vertex]) = (mean.irradiance, mean.indirect);
             }
             covered.resize(count, false);
-            indirect.resize(count, 0.0);
             break;
         }
         let end = (start + chunk).min(count);
@@ -100,9 +99,7 @@ pub(crate) fn reconstruct<L: LightField>(
                     return Gathering::default();
                 }
                 if !gathers(vertex as u32) {
-                    let indirect: f32 = around.iter().map(|&leaf| light.exitant.indirect[leaf as usize]).sum();
-                    let irradiance = mean_around(light, &vertices, vertex as u32);
-                    return Gathering { irradiance, indirect: indirect / around.len() as f32, ..Gathering::default() };
+                    return mean_around(light, &vertices, vertex as u32);
                 }
                 let (afar, seed) = (&from_afar[vertex], seed(vertices.positions[vertex]));
                 let spots = || footprint(light, (&vertices, vertex as u32), (COVER, seed));
@@ -127,38 +124,41 @@ pub(crate) fn reconstruct<L: LightField>(
             rays += u64::from(gathering.rays);
             vertices.irradiance[vertex] = gathering.irradiance;
             covered.push(gathering.covered);
-            indirect.push(gathering.indirect);
+            vertices.indirect[vertex] = gathering.indirect;
         }
     }
-    agree(light, &mut vertices, &indirect, seen);
+    agree(light, &mut vertices, seen);
     uncover(&mut vertices, &covered, &is_seen);
-    within.fill(&light.exitant.irradiance, &mut vertices);
+    within.fill(light, &mut vertices);
     let unseen = is_seen.iter().filter(|&&is_seen| !is_seen).count() as u64;
     (vertices, Cost { rays, within: within.count(), unseen })
 }
 
-/// Mean irradiance of the leaves around a vertex.
-fn mean_around<L: LightField>(light: Light<'_, L>, vertices: &Vertices, vertex: u32) -> Rgb {
+/// The mean of the leaves around a vertex.
+fn mean_around<L: LightField>(light: Light<'_, L>, vertices: &Vertices, vertex: u32) -> Gathering {
     let around = vertices.leaves_around(vertex);
-    let sum: Rgb = around.iter().map(|&leaf| light.exitant.irradiance[leaf as usize]).sum();
-    sum / around.len().max(1) as f32
+    let mean = |of: &[Rgb]| around.iter().map(|&leaf| of[leaf as usize]).sum::<Rgb>() / around.len().max(1) as f32;
+    let [irradiance, indirect] = [&light.exitant.irradiance, &light.exitant.indirect].map(|of| mean(of));
+    Gathering { irradiance, indirect, ..Gathering::default() }
 }
 
 /// What vertices gather of reflected light, with links made for something larger, is made to agree with what the leaves around have,
 /// which has been compared with more rays: region by region, so that it stays as smooth as it is. Direct light may vary over a leaf in ways
 /// that its mean does not tell. Only leaves that are `seen` are compared: around others not all have gathered.
-fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, gathered: &[f32], seen: Seen<'_>) {
+fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, seen: Seen<'_>) {
     // Of a solution without reflected light, or one that was stopped before any, there is nothing to agree with.
-    if light.exitant.indirect.iter().all(|&indirect| indirect == 0.0) {
+    if light.exitant.indirect.iter().all(|&indirect| indirect == Rgb::ZERO) {
         return;
     }
+    let gathered: Vec<f32> = vertices.indirect.iter().map(|indirect| indirect.element_sum()).collect();
     let compared = |leaf: u32| {
         let element = light.element(leaf);
         let counts = element.importance > 0.0 && light.elements.exposed(leaf) >= 1.0 && seen(NodeId(leaf));
-        let mean = vertices.mean(leaf, gathered).filter(|&mean| counts && mean > 0.0);
+        let mean = vertices.mean(leaf, &gathered).filter(|&mean| counts && mean > 0.0);
         let sums = mean.map(|mean| {
             let weight = f64::from(element.area * element.importance);
-            Sums::of(weight * f64::from(light.exitant.indirect[leaf as usize]), weight * f64::from(mean))
+            let ours = light.exitant.indirect[leaf as usize].element_sum();
+            Sums::of(weight * f64::from(ours), weight * f64::from(mean), 0.0)
         });
         (leaf, sums.unwrap_or_default())
     };
@@ -168,21 +168,20 @@ fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, gathered: 
         let sum: f64 = around.iter().map(|&leaf| factors[leaf as usize]).sum();
         (sum / around.len().max(1) as f64).clamp(MOST_CHANGE.recip(), MOST_CHANGE) as f32
     };
-    let changed = |vertex: u32| {
-        let before = vertices.irradiance[vertex as usize];
-        let share = gathered[vertex as usize] / before.element_sum().max(f32::MIN_POSITIVE);
-        before * (1.0 + (factor(vertex) - 1.0) * share.min(1.0))
-    };
-    vertices.irradiance = (0..gathered.len() as u32).map(changed).collect();
+    let factors: Vec<f32> = (0..vertices.indirect.len() as u32).map(factor).collect();
+    for ((irradiance, indirect), factor) in vertices.irradiance.iter_mut().zip(&mut vertices.indirect).zip(factors) {
+        *irradiance += *indirect * (factor - 1.0);
+        *indirect *= factor;
+    }
 }
 
 /// Nobody sees the darkness behind a picture on a wall or below a cupboard, but interpolation would carry it to where it
 /// is seen: vertices there take the mean irradiance of the others around, but for those that nobody sees, which may be dark, too.
 fn uncover(vertices: &mut Vertices, covered: &[bool], is_seen: &[bool]) {
     let is_lit = |vertex: u32| !covered[vertex as usize] && is_seen[vertex as usize];
-    let mut lit: Vec<(u32, Rgb)> = Vec::new();
+    let mut lit: Vec<(u32, [Rgb; 2])> = Vec::new();
     for vertex in (0..covered.len() as u32).filter(|&vertex| covered[vertex as usize]) {
-        let (mut sum, mut count) = (Rgb::ZERO, 0.0);
+        let (mut sums, mut count) = ([Rgb::ZERO; 2], 0.0);
         for &leaf in vertices.leaves_around(vertex) {
             for corner in vertices
                 .fans(leaf)
@@ -190,16 +189,17 @@ fn uncover(vertices: &mut Vertices, covered: &[bool], is_seen: &[bool]) {
                 .flatten()
                 .filter(|corner| is_lit(corner.vertex))
             {
-                sum += vertices.irradiance[corner.vertex as usize];
+                sums[0] += vertices.irradiance[corner.vertex as usize];
+                sums[1] += vertices.indirect[corner.vertex as usize];
                 count += 1.0;
             }
         }
         if count > 0.0 {
-            lit.push((vertex, sum / count));
+            lit.push((vertex, sums.map(|sum| sum / count)));
         }
     }
-    for (vertex, irradiance) in lit {
-        vertices.irradiance[vertex as usize] = irradiance;
+    for (vertex, [irradiance, indirect]) in lit {
+        (vertices.irradiance[vertex as usize], vertices.indirect[vertex as usize]) = (irradiance, indirect);
     }
 }
 
@@ -237,7 +237,7 @@ fn gather_at<L: LightField>(
     // Light whose visibility is known here, and light with the visibility that links have for something larger.
     let (mut own, mut kept) = ([Rgb::ZERO; 3], inherited.map(|brought| brought.irradiance));
     // What of both has been reflected.
-    let mut reflected = [[0.0; 3], inherited.map(|brought| brought.indirect)];
+    let mut reflected = [[Rgb::ZERO; 3], inherited.map(|brought| brought.indirect)];
     let [_, emitters, rest] = inherited.map(|brought| brought.share);
     let (mut rays, mut row) = (0, Row { emitters, own: 0.0, inherited: rest });
     let mut known_here: SmallVec<[u32; 64]> = SmallVec::new();
@@ -267,8 +267,7 @@ fn gather_at<L: LightField>(
         }
         let group = Group::of(light, sender);
         (if known { &mut own } else { &mut kept })[group as usize] += irradiance * visibility.abs();
-        reflected[usize::from(!known)][group as usize] +=
-            irradiance.element_sum() * visibility.abs() * shares[sender as usize];
+        reflected[usize::from(!known)][group as usize] += irradiance * (visibility.abs() * shares[sender as usize]);
         *match group {
             Group::Light => continue,
             Group::Emitter => &mut row.emitters,
@@ -303,8 +302,8 @@ struct Brought {
     irradiance: Rgb,
     /// Share of the view.
     share: f32,
-    /// What of the irradiance has been reflected before (sum of channels).
-    indirect: f32,
+    /// What of the irradiance has been reflected before.
+    indirect: Rgb,
 }
 
 impl Brought {
@@ -313,7 +312,7 @@ impl Brought {
         Self {
             irradiance: self.irradiance.max(Rgb::ZERO),
             share: self.share.max(0.0),
-            indirect: self.indirect.max(0.0),
+            indirect: self.indirect.max(Rgb::ZERO),
         }
     }
 }
@@ -363,7 +362,7 @@ fn inherited<L: LightField>(
             return Brought::default();
         }
         let irradiance = carried(light, link, spread);
-        let indirect = irradiance.element_sum() * shares[link.sender as usize];
+        let indirect = irradiance * shares[link.sender as usize];
         Brought { irradiance, share: share(light, link, spread), indirect }
     };
     let carried: Vec<Brought> = links.all().par_iter().zip(spreads).map(brought).collect();
@@ -407,8 +406,8 @@ fn inherited<L: LightField>(
 #[derive(Default)]
 struct Gathering {
     irradiance: Rgb,
-    /// What of it has been reflected before (sum of channels).
-    indirect: f32,
+    /// What of it has been reflected before.
+    indirect: Rgb,
     rays: u32,
     covered: bool,
 }
@@ -424,27 +423,66 @@ struct Arriving {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::form_factor::point_to_polygon;
     use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
     use glam::DVec3;
+
+    /// Below the ceiling of a unit room; its front faces down.
+    const LAMP: [DVec3; 4] = [
+        DVec3::new(0.3, 0.3, 0.99),
+        DVec3::new(0.3, 0.7, 0.99),
+        DVec3::new(0.7, 0.7, 0.99),
+        DVec3::new(0.7, 0.3, 0.99),
+    ];
+
+    /// A solved room with a lamp. One side is open, so that nobody knows how much there is to see.
+    fn room() -> Solver {
+        let (x, y, z, o) = (DVec3::X, DVec3::Y, DVec3::Z, DVec3::ZERO);
+        let quad = |o: DVec3, a: DVec3, b: DVec3| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), 0);
+        let wall = DiffuseMaterial { reflectance: Rgb::splat(0.6), exitance: Rgb::ZERO, two_sided: false };
+        let lamp = DiffuseMaterial { exitance: Rgb::ONE, ..wall };
+        let surfaces = vec![
+            quad(o, x, y),
+            quad(z, y, x),
+            quad(o, y, z),
+            quad(x, z, y),
+            quad(o, z, x),
+            Surface::new(Shape::Quad(LAMP), 1),
+        ];
+        let input = SceneInput { surfaces, materials: vec![wall, lamp], ..SceneInput::default() };
+        let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        solver
+    }
+
+    fn vertices(solver: &Solver, links: &Links) -> Vertices {
+        reconstruct(solver.light(), (links, None), (0.05, &|_| true), &mut |_| ControlFlow::Continue(())).0
+    }
+
+    /// All light but that is the lamp's own, and on the floor that is known.
+    #[test]
+    fn vertices_know_what_has_been_reflected() {
+        let solver = room();
+        let vertices = vertices(&solver, &solver.links);
+        let lamp = LAMP.map(|corner| solver.scene.normalization.to_unit(corner));
+        let (mut ours, mut right, mut reflected) = (0.0, 0.0, 0.0);
+        for vertex in 0..vertices.positions.len() {
+            if solver.elements.nodes[vertices.leaf[vertex] as usize].source == 0 {
+                ours += (vertices.irradiance[vertex] - vertices.indirect[vertex]).x;
+                right += point_to_polygon(vertices.positions[vertex], Vec3::Z, &lamp);
+                reflected += vertices.indirect[vertex].x;
+            }
+        }
+        assert!((ours / right - 1.0).abs() < 0.02, "{ours}, not {right}");
+        assert!(reflected > 0.2 * right, "some is reflected: {reflected}");
+    }
 
     /// Links that bring too little are noticed by the leaves' light, which vertices are made to agree with.
     #[test]
     fn vertices_agree_with_their_leaves() {
-        let (x, y, z, o) = (DVec3::X, DVec3::Y, DVec3::Z, DVec3::ZERO);
-        let quad =
-            |o: DVec3, a: DVec3, b: DVec3, material| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), material);
-        let wall = DiffuseMaterial { reflectance: Rgb::splat(0.6), exitance: Rgb::ZERO, two_sided: false };
-        let lamp = DiffuseMaterial { exitance: Rgb::ONE, ..wall };
-        let light = quad(DVec3::new(0.3, 0.3, 0.99), y * 0.4, x * 0.4, 1);
-        // One side is open, so that nobody knows how much there is to see.
-        let surfaces =
-            vec![quad(o, x, y, 0), quad(z, y, x, 0), quad(o, y, z, 0), quad(x, z, y, 0), quad(o, z, x, 0), light];
-        let input = SceneInput { surfaces, materials: vec![wall, lamp], ..SceneInput::default() };
-        let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
-        solver.solve(&mut |_| ControlFlow::Continue(()));
+        let mut solver = room();
         let mean = |solver: &Solver, links: &Links| {
-            let (vertices, _) =
-                reconstruct(solver.light(), (links, None), (0.05, &|_| true), &mut |_| ControlFlow::Continue(()));
+            let vertices = vertices(solver, links);
             vertices.irradiance.iter().map(|irradiance| irradiance.x).sum::<f32>() / vertices.irradiance.len() as f32
         };
         let right = mean(&solver, &solver.links);

@@ -294,7 +294,7 @@ impl<L: LightField> MutableLight<'_, L> {
             exitant.range.push([own, own]);
             exitant.facing.push(element.facing);
             exitant.irradiance.push(exitant.irradiance[parent]);
-            exitant.indirect.push(0.0);
+            exitant.indirect.push(Rgb::ZERO);
             exitant.directional.push(exitant.directional[parent]);
             exitant.reflected_as.push(exitant.reflected_as[parent]);
             exitant.peak.push(0.0);

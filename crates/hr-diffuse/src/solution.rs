@@ -138,6 +138,13 @@ impl<L: LightField> Solution<L> {
         corners.iter().map(|&(vertex, weight)| self.vertices.irradiance[vertex as usize] * weight).sum()
     }
 
+    /// What of [`irradiance`](Self::irradiance) is light that has been reflected before: the rest comes from emitters.
+    #[must_use]
+    pub fn indirect_irradiance(&self, leaf: NodeId, uv: Vec2) -> Rgb {
+        let corners = self.vertices.interpolation(leaf.0, uv);
+        corners.iter().map(|&(vertex, weight)| self.vertices.indirect[vertex as usize] * weight).sum()
+    }
+
     /// What the extension keeps of the incident light of a leaf and of all its ancestors, the root first.
     #[must_use]
     pub fn incident_path(&self, leaf: NodeId) -> Vec<&L::Incident> {

@@ -218,7 +218,7 @@ impl<L: LightField> Solver<L> {
             range: vec![[Rgb::ZERO; 2]; count],
             facing: vec![Facing::ZERO; count],
             irradiance: vec![Rgb::ZERO; count],
-            indirect: vec![0.0; count],
+            indirect: vec![Rgb::ZERO; count],
             directional: vec![Rgb::ZERO; count],
             reflected_as: (0..count as u32).collect(),
             peak: vec![0.0; count],

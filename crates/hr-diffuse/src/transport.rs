@@ -29,8 +29,8 @@ pub struct Exitant {
     pub facing: Vec<Facing>,
     /// Mean irradiance on those of the node's surfaces that reflect any light, W/m².
     pub irradiance: Vec<Rgb>,
-    /// By leaf, mean irradiance by light that has been reflected before, W/m², sum of channels.
-    pub indirect: Vec<f32>,
+    /// By leaf, mean irradiance by light that has been reflected before, W/m².
+    pub indirect: Vec<Rgb>,
     /// Mean radiant exitance as directional light, W/m².
     pub directional: Vec<Rgb>,
     /// Leaves that stand for the senders of directional light.

@@ -31,8 +31,10 @@ pub struct Vertices {
     pub positions: Vec<Vec3>,
     /// Unit normals on the side of the elements that share the vertex.
     pub normals: Vec<Vec3>,
-    /// Irradiance, W/m².
+    /// Irradiance, W/m², …
     pub irradiance: Vec<Rgb>,
+    /// … and what of it is light that has been reflected before.
+    pub indirect: Vec<Rgb>,
     /// The smallest leaf at the vertex.
     pub leaf: Vec<u32>,
     /// Where the vertex is on that leaf's surface.
@@ -247,6 +249,7 @@ impl Vertices {
         self.positions.push(position);
         self.normals.push(normal);
         self.irradiance.push(Rgb::ZERO);
+        self.indirect.push(Rgb::ZERO);
         self.leaf.push(leaf);
         self.uv.push(uv);
         self.positions.len() as u32 - 1

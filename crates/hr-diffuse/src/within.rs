@@ -69,38 +69,43 @@ impl Within {
     }
 
     /// Gives the vertices within their values; the others have theirs.
-    pub(crate) fn fill(&self, irradiance: &[Rgb], vertices: &mut Vertices) {
+    pub(crate) fn fill<L: LightField>(&self, light: Light<'_, L>, vertices: &mut Vertices) {
         if self.leaves.is_empty() {
             return;
         }
-        let mut of_leaf = irradiance.to_vec();
-        self.even_out(&of_leaf, vertices);
+        let [mut irradiance, mut indirect] = [&mut vertices.irradiance, &mut vertices.indirect].map(std::mem::take);
+        self.fill_with(light.exitant.irradiance.clone(), vertices, &mut irradiance);
+        self.fill_with(light.exitant.indirect.clone(), vertices, &mut indirect);
+        (vertices.irradiance, vertices.indirect) = (irradiance, indirect);
+    }
+
+    /// The same for one of the quantities that they have, by that of each leaf.
+    fn fill_with(&self, mut of_leaf: Vec<Rgb>, vertices: &Vertices, values: &mut [Rgb]) {
+        self.even_out(&of_leaf, vertices, values);
         for _ in 0..self.rounds {
             let mean = |&leaf: &u32| {
                 let corners = vertices.fans(leaf).flat_map(|fan| &fan[1..]);
                 let (mut sum, mut count) = (Rgb::ZERO, 0.0);
                 corners.for_each(|corner| {
-                    sum += vertices.irradiance[corner.vertex as usize];
+                    sum += values[corner.vertex as usize];
                     count += 1.0;
                 });
                 (leaf, sum / f32::max(count, 1.0))
             };
             let means: Vec<(u32, Rgb)> = self.leaves.par_iter().with_min_len(1024).map(mean).collect();
             means.into_iter().for_each(|(leaf, mean)| of_leaf[leaf as usize] = mean);
-            self.even_out(&of_leaf, vertices);
+            self.even_out(&of_leaf, vertices, values);
         }
     }
 
     /// Sets the vertices within to the mean of the leaves around.
-    fn even_out(&self, of_leaf: &[Rgb], vertices: &mut Vertices) {
-        let mut values = std::mem::take(&mut vertices.irradiance);
+    fn even_out(&self, of_leaf: &[Rgb], vertices: &Vertices, values: &mut [Rgb]) {
         values.par_iter_mut().enumerate().with_min_len(1024).filter(|(vertex, _)| self.holds[*vertex]).for_each(
             |(vertex, value)| {
                 let around = vertices.leaves_around(vertex as u32);
                 *value = around.iter().map(|&leaf| of_leaf[leaf as usize]).sum::<Rgb>() / around.len() as f32;
             },
         );
-        vertices.irradiance = values;
     }
 }
 

@@ -43,10 +43,11 @@ impl Pixel {
         }
     }
 
-    /// Mean radiance; black without samples.
+    /// Mean radiance; black without samples, and where noise makes it less than nothing, as it may that of a sample.
     #[must_use]
     pub fn radiance(&self) -> Rgb {
-        (self.parts.iter().map(|part| part.sum).sum::<DVec3>() / f64::from(self.samples().max(1))).as_vec3()
+        let sum: DVec3 = self.parts.iter().map(|part| part.sum).sum();
+        (sum / f64::from(self.samples().max(1))).as_vec3().max(Rgb::ZERO)
     }
 
     /// Whether surfaces differ by more than this share of the brightest.
@@ -122,7 +123,7 @@ impl Film {
 fn mixed(print: &Print, pixel: &Pixel) -> [u8; 3] {
     let mut light = DVec3::ZERO;
     for part in &pixel.parts {
-        let radiance = (part.sum / f64::from(part.samples)).as_vec3();
+        let radiance = (part.sum / f64::from(part.samples)).as_vec3().max(Rgb::ZERO);
         light += print.linear(radiance).as_dvec3() * f64::from(part.samples);
     }
     (light / f64::from(pixel.samples().max(1))).to_array().map(|v| (255.0 * srgb_transfer(v)).round() as u8)

@@ -30,6 +30,7 @@ use hr_diffuse::visibility::NO_BLOCKER;
 use hr_diffuse::{Geometry, Hit, Normalization, Rgb, SolveError, Visibility};
 use hr_scene::{Camera, Film, Image, Pixel, Scene};
 use rayon::prelude::*;
+use smallvec::SmallVec;
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -344,6 +345,32 @@ impl<'a> PathTracer<'a> {
         light
     }
 
+    /// Irradiance by emitters where a surface was hit by a ray of the unit `direction`, from one point of one of them, which two pairs of
+    /// random numbers draw; by what is known of those `nearby`.
+    ///
+    /// Of emitters of which a share s is believed to be seen, that share of all their light u, were nothing between, is known without
+    /// chance. A point of density p that sends l and is seen (v = 1) or not (v = 0) adds (v - s) l / p to that, whose mean is what it
+    /// lacks (a control variate). Where s is 0 or 1, and right, there is no noise in it; else it may be less than nothing.
+    pub fn irradiance(&self, hit: &Hit, direction: Vec3, [choice, place]: [Vec2; 2], nearby: Option<&Nearby>) -> Rgb {
+        let Some(point) = self.point(hit, direction) else { return Rgb::ZERO };
+        let geometries = self.visibility.geometries();
+        let normals = [point.place.frame.z_axis, point.true_normal];
+        let expected: SmallVec<[(u32, f32, Rgb); 4]> = (nearby.into_iter().flat_map(Nearby::surely_seen))
+            .filter_map(|(entry, seen)| {
+                let unoccluded = self.emitters.unoccluded(geometries, entry, point.position, normals)?;
+                Some((entry, seen, unoccluded * seen))
+            })
+            .collect();
+        let sum: Rgb = expected.iter().map(|(.., irradiance)| irradiance).sum();
+        let drawn = self.emitters.draw(geometries, point.position, choice.x, place, nearby);
+        let Some(arrival) = drawn.filter(|arrival| point.is_lit_from(arrival.direction)) else { return sum };
+        let believed = expected.iter().find(|(entry, ..)| *entry == arrival.entry).map_or(0.0, |(_, seen, _)| *seen);
+        let ends = [point.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
+        let blocked = self.visibility.occluded(point.position, arrival.from, ends, &mut { NO_BLOCKER });
+        let seen = if blocked { 0.0 } else { 1.0 };
+        sum + arrival.irradiance * (point.cosine(arrival.direction) * (seen - believed))
+    }
+
     /// What of an emitter's light counts for a ray of some density that met it; the rest is that of draws.
     fn share_of_emission(&self, hit: &Hit, direction: Vec3, density: f32, draws: Draws<'_>) -> f32 {
         let Some(entry) = self.emitters.of_surface(hit.surface) else { return 1.0 };
@@ -480,10 +507,10 @@ impl Point {
     /// BRDF · cosine for light that was drawn from an emitter, each part of the BRDF weighted against the chance that
     /// a path that follows it finds the same light.
     fn reflected(&self, arrival: &Arrival) -> Rgb {
-        let incident = self.place.local(arrival.direction);
-        if incident.z <= 0.0 || arrival.direction.dot(self.true_normal) <= 0.0 {
+        if !self.is_lit_from(arrival.direction) {
             return Rgb::ZERO;
         }
+        let incident = self.place.local(arrival.direction);
         let weight = |density: f32| power_heuristic(arrival.density, density);
         let mut brdf = self.diffuse * (FRAC_1_PI * weight(self.diffuse_density(incident)));
         if self.chances[1] > 0.0 {
@@ -491,6 +518,16 @@ impl Point {
             brdf += glossy * weight(self.glossy_density(glossy, incident));
         }
         brdf * incident.z
+    }
+
+    /// Whether light from a direction arrives on this side.
+    fn is_lit_from(&self, direction: Vec3) -> bool {
+        self.cosine(direction) > 0.0 && direction.dot(self.true_normal) > 0.0
+    }
+
+    /// To the shading normal.
+    fn cosine(&self, direction: Vec3) -> f32 {
+        self.place.frame.z_axis.dot(direction)
     }
 
     /// Follows one part of the BRDF; none where it leads nowhere.

@@ -1,7 +1,8 @@
 //! The CPU ray caster: an image of a solution without a GPU.
 //!
 //! Every pixel sends a few rays; where one meets a surface, the diffuse light comes from the irradiance at the
-//! vertices, and the glossy part as the [`Mode`] says. A final gather does that only one reflection later: the paths of
+//! vertices, and the glossy part as the [`Mode`] says. Of [samples](Mode::Samples) emitters' own light is found by rays to them.
+//! A final gather does that only one reflection later: the paths of
 //! a [path tracer](crate::path_tracer) end where they meet the solution, whose elements and mistakes are then seen blurred.
 
 use crate::glossy::{self, Mode, NARROWEST};
@@ -60,11 +61,11 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     grid: u32,
     /// Lobes narrower than this (radians) are followed by rays.
     followed: f32,
-    /// For final gathers, and for what is in lobes that are followed.
+    /// For final gathers, for what is in lobes that are followed, and for the light of emitters.
     tracer: PathTracer<'a>,
     /// Nodes that glow, rising.
     glowing: Vec<u32>,
-    /// For final gathers, by node, which emitters light it; found out of leaves where it is asked for.
+    /// By node, which emitters light it; found out of leaves where it is asked for.
     nearby: Vec<OnceLock<Nearby>>,
 }
 
@@ -132,7 +133,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let glowing = if mode == Mode::Gather { glowing(scene, solution) } else { Vec::new() };
         let glows: Vec<_> = glowing.iter().map(|&(node, light)| glow(solution, node, light)).collect();
         let tracer = PathTracer::with_glow(scene, &solution.scene.visibility, &glows);
-        let nodes = if mode == Mode::Gather { solution.elements.nodes.len() } else { 0 };
+        let nodes = if mode == Mode::Distributions { 0 } else { solution.elements.nodes.len() };
         let nearby = std::iter::repeat_with(OnceLock::new).take(nodes).collect();
         let glowing = glowing.iter().map(|&(node, _)| node).collect();
         Self { scene, solution, mode, grid: 3, followed: f32::INFINITY, tracer, glowing, nearby }
@@ -146,8 +147,8 @@ impl<'a, B: Basis> RayCaster<'a, B> {
 
     /// With [`Mode::Samples`]: lobes narrower than `width` (standard deviation in radians) are followed by rays, in wider ones
     /// the samples are reflected that arrive. All are followed by default, as a sample stands for all of a sender, which looks
-    /// different from each place where it is glossy itself, and is more than a lobe's width across where it is near. 0 is the paper's
-    /// section 3.4, as the window's graphics device does it. A pixel of wide lobes takes up to three times as long followed.
+    /// different from each place where it is glossy itself, and is more than a lobe's width across where it is near. With 0 there are no
+    /// rays but the pixel's: that is the paper's section 3.4, as the window's graphics device does it, with diffuse light as vertices have it. A pixel of wide lobes takes up to three times as long followed.
     #[must_use]
     pub fn with_followed(self, width: f32) -> Self {
         Self { followed: width, ..self }
@@ -290,7 +291,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let reflector = base_color
             .and_then(|color| material.reflector.with_base_color(color))
             .unwrap_or_else(|| Arc::clone(&material.reflector));
-        let irradiance = self.solution.irradiance(leaf, hit.uv);
+        let irradiance = self.irradiance(&hit, leaf, direction, bounce, sampler);
         let diffuse = reflector.diffuse() * irradiance * FRAC_1_PI;
         if reflector.is_diffuse() {
             return diffuse;
@@ -311,7 +312,20 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             }
             Mode::Samples | Mode::Gather => self.interpolated(&met),
         };
-        (diffuse + glossy).max(Rgb::ZERO)
+        // Noise may make less than nothing of what is seen at once; on the mean of a pixel that is gone.
+        let least = if bounce == 0 { Rgb::NEG_INFINITY } else { Rgb::ZERO };
+        (diffuse + glossy).max(least)
+    }
+
+    /// Irradiance where a leaf was hit: that at vertices; what is seen at once has in [`Mode::Samples`] the emitters' own light from
+    /// rays to them, as shadows may be finer than vertices tell.
+    fn irradiance(&self, hit: &Hit, leaf: NodeId, direction: Vec3, bounce: u32, sampler: &Sampler) -> Rgb {
+        if self.mode != Mode::Samples || bounce > 0 || self.followed <= 0.0 {
+            return self.solution.irradiance(leaf, hit.uv);
+        }
+        let pairs = [4, 5].map(|dimension| sampler.pair(dimension));
+        let direct = self.tracer.irradiance(hit, direction.normalize(), pairs, self.nearby(hit));
+        self.solution.indirect_irradiance(leaf, hit.uv) + direct
     }
 
     /// A point that a ray met, which is reflected by this reflector.

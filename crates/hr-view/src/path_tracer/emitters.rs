@@ -6,6 +6,7 @@ use super::groups::Groups;
 use super::nearby::Nearby;
 use glam::{Vec2, Vec3};
 use hr_diffuse::beams::spot_ramp;
+use hr_diffuse::form_factor::{point_to_sphere, point_to_surface};
 use hr_diffuse::{Domain, Geometry, Light, LightKind, Normalization, Rgb, Shape, Surface};
 use hr_scene::Scene;
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -84,6 +85,8 @@ impl<'a> From<Option<&'a Nearby>> for Draws<'a> {
 pub struct Arrival {
     /// Where it comes from; for directional light a point outside of the scene.
     pub from: Vec3,
+    /// Which emitter it is.
+    pub entry: u32,
     /// The emitting surface, if it is one.
     pub surface: Option<u32>,
     /// The emitter, and the radiance that it is believed to have in each channel, if it is a part of a surface that reflects.
@@ -266,6 +269,7 @@ impl Emitters {
                 let cosine = -normal.dot(direction);
                 (distance2 > 0.0 && cosine > 0.0).then(|| Arrival {
                     from,
+                    entry,
                     surface: Some(glow.surface),
                     glow: self.is_glowing(entry).then_some((entry, glow.radiance.x)),
                     seen: 1.0,
@@ -289,6 +293,7 @@ impl Emitters {
                 let extent = TAU * narrowness;
                 Some(Arrival {
                     from: at + direction * near,
+                    entry,
                     surface: Some(*surface),
                     glow: None,
                     seen: 1.0,
@@ -311,6 +316,7 @@ impl Emitters {
                 };
                 (share > 0.0 && share.is_finite()).then(|| Arrival {
                     from,
+                    entry,
                     surface: None,
                     glow: None,
                     seen: 1.0,
@@ -319,6 +325,32 @@ impl Emitters {
                     density: f32::INFINITY,
                 })
             }
+        }
+    }
+
+    /// Irradiance of all of an emitter at a point with the unit normal `n`, were nothing between; none where there is no closed form, or
+    /// where part of it lies below the horizon of the surface's `true_normal`, which hides it but is not that of `n`.
+    pub(super) fn unoccluded(
+        &self,
+        geometries: &[Geometry],
+        entry: u32,
+        at: Vec3,
+        [n, true_normal]: [Vec3; 2],
+    ) -> Option<Rgb> {
+        let above = |point: Vec3, radius: f32| n == true_normal || (point - at).dot(true_normal) >= radius;
+        match &self.entries[entry as usize].source {
+            Source::Surface(glow) => {
+                let geometry = &geometries[glow.surface as usize];
+                let mut corners = geometry.corners(glow.domain).into_iter();
+                if !geometry.is_polygon() || !corners.all(|uv| above(geometry.point(uv), 0.0)) {
+                    return None;
+                }
+                Some(glow.radiance * PI * point_to_surface(geometry, &glow.domain, glow.back, at, n))
+            }
+            Source::Sphere { center, radius, radiance, .. } => {
+                above(*center, *radius).then(|| *radiance * PI * point_to_sphere(at, n, *center, *radius))
+            }
+            Source::Light { .. } => None,
         }
     }
 

@@ -19,6 +19,8 @@ const LOOKED_AT: usize = 64;
 const BELIEVED: f32 = 0.25;
 /// Rays to each of them.
 const RAYS: u32 = 8;
+/// Where more emitters than these bring light it would take too long to look at each of them.
+const FEW: usize = 16;
 /// Of an emitter that no ray found so much is believed to be seen.
 const LEAST_SEEN: f32 = 0.1;
 /// Emitters that bring less than this of all are left to power.
@@ -112,6 +114,12 @@ impl Nearby {
             entries: found.iter().map(|found| found.entry).collect(),
             seen: found.iter().map(|found| found.seen).collect(),
         }
+    }
+
+    /// The emitters of which some ray saw something, and the share that is seen of each; none where there are many.
+    pub(super) fn surely_seen(&self) -> impl Iterator<Item = (u32, f32)> {
+        let few = if self.entries.len() <= FEW { self.entries.len() } else { 0 };
+        self.entries[..few].iter().copied().zip(self.seen.iter().copied()).filter(|&(_, seen)| seen > LEAST_SEEN)
     }
 
     /// Share of an emitter that is seen, about, > 0.

@@ -67,7 +67,7 @@ fn prints_of_what_is_noisy_have_more_rays() {
         Solved::new(Arc::clone(&scene), settings, false, &mut |_| ControlFlow::Continue(())).expect("solvable");
     let camera = Camera { width: 40, height: 30, ..scene.default_camera() };
     let caster = |grid| RayCaster::new(&scene, &solved.solution, Mode::Samples).with_grid(grid);
-    let (film, fine) = (caster(2).film(&camera, &|_| ()), caster(6).film(&camera, &|_| ()));
+    let (film, fine) = (caster(2).film(&camera, &|_| ()), caster(12).film(&camera, &|_| ()));
     assert_eq!(film.image, caster(2).render(&camera, &|_| ()), "radiance is that of any image");
     let factor = ToneMap::default().factor(&fine.image.pixels, scene.primaries);
     let map = ToneMap { exposure: Exposure::Factor(factor), ..ToneMap::default() };
@@ -79,6 +79,6 @@ fn prints_of_what_is_noisy_have_more_rays() {
     .map(|codes| codes.iter().map(|&code| shown(code)).collect::<Vec<_>>());
     let off = |codes: &[f32]| codes.iter().zip(&right).map(|(a, b)| (a - b).abs()).sum::<f32>();
     let (printed, plain) = (off(&printed), off(&plain));
-    // Up to eight times as many rays.
-    assert!(printed < 0.6 * plain, "{printed} off where there are more rays, {plain} where there are not");
+    // Up to eight times as many rays; not where there is less noise than prints show.
+    assert!(printed < 0.7 * plain, "{printed} off where there are more rays, {plain} where there are not");
 }

@@ -73,6 +73,23 @@ fn rays_into_lobes_are_nearer_to_the_truth_than_samples() {
     assert!(followed < 0.06 && followed < 0.6 * reflected, "off by {followed}, samples by {reflected}");
 }
 
+/// Of a coarse solution: its leaves are as large as the shadows.
+#[test]
+fn shadows_at_pixels_are_nearer_to_the_truth_than_those_of_vertices() {
+    let scene = Arc::new(Scene::load("cornell").expect("built in"));
+    let camera = Camera { width: 64, height: 48, ..scene.cameras[1].1 };
+    let rays = path_tracer::visibility(&scene).expect("sound");
+    let right = PathTracer::new(&scene, &rays).render(&camera, 1024, 1, &|_| ());
+    let right = blocks(&right.image, &camera);
+    let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.3), false, &mut |_| ControlFlow::Continue(()))
+        .expect("solvable");
+    let [at_pixels, at_vertices] = [f32::INFINITY, 0.0].map(|width| {
+        let caster = RayCaster::new(&scene, &solved.solution, Mode::Samples).with_followed(width);
+        difference(&blocks(&caster.render(&camera, &|_| ()), &camera), &right, 1.0)
+    });
+    assert!(at_pixels < 0.025 && at_pixels < 0.7 * at_vertices, "off by {at_pixels}, vertices by {at_vertices}");
+}
+
 #[test]
 fn final_gathers_are_the_same_on_any_number_of_threads() {
     let scene = Arc::new(Scene::load("glossy-sphere").expect("built in"));
