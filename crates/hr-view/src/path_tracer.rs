@@ -58,6 +58,10 @@ const LEAST_COSINE: f32 = 1e-3;
 
 /// Pairs of random numbers that one bounce uses, after the pixel's own.
 const PAIRS: u32 = 4;
+/// Pairs that tell which emitters irradiance is drawn from.
+const IRRADIANCE_PAIRS: [u32; 2] = [4, 5];
+/// Draws for irradiance in half shadow.
+const SHADED_DRAWS: u32 = 4;
 
 /// Path traces a scene.
 #[derive(Debug)]
@@ -345,13 +349,13 @@ impl<'a> PathTracer<'a> {
         light
     }
 
-    /// Irradiance by emitters where a surface was hit by a ray of the unit `direction`, from one point of one of them, which two pairs of
-    /// random numbers draw; by what is known of those `nearby`.
+    /// Irradiance by emitters where a surface was hit by a ray of the unit `direction`, from one point of one of them, or from a few where it
+    /// is believed to lie in half shadow, by what is known of those `nearby`.
     ///
     /// Of emitters of which a share s is believed to be seen, that share of all their light u, were nothing between, is known without
     /// chance. A point of density p that sends l and is seen (v = 1) or not (v = 0) adds (v - s) l / p to that, whose mean is what it
     /// lacks (a control variate). Where s is 0 or 1, and right, there is no noise in it; else it may be less than nothing.
-    pub fn irradiance(&self, hit: &Hit, direction: Vec3, [choice, place]: [Vec2; 2], nearby: Option<&Nearby>) -> Rgb {
+    pub fn irradiance(&self, hit: &Hit, direction: Vec3, sampler: &Sampler, nearby: Option<&Nearby>) -> Rgb {
         let Some(point) = self.point(hit, direction) else { return Rgb::ZERO };
         let geometries = self.visibility.geometries();
         let normals = [point.place.frame.z_axis, point.true_normal];
@@ -361,14 +365,21 @@ impl<'a> PathTracer<'a> {
                 Some((entry, seen, unoccluded * seen))
             })
             .collect();
-        let sum: Rgb = expected.iter().map(|(.., irradiance)| irradiance).sum();
-        let drawn = self.emitters.draw(geometries, point.position, choice.x, place, nearby);
-        let Some(arrival) = drawn.filter(|arrival| point.is_lit_from(arrival.direction)) else { return sum };
-        let believed = expected.iter().find(|(entry, ..)| *entry == arrival.entry).map_or(0.0, |(_, seen, _)| *seen);
-        let ends = [point.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
-        let blocked = self.visibility.occluded(point.position, arrival.from, ends, &mut { NO_BLOCKER });
-        let seen = if blocked { 0.0 } else { 1.0 };
-        sum + arrival.irradiance * (point.cosine(arrival.direction) * (seen - believed))
+        let mut light: Rgb = expected.iter().map(|(.., irradiance)| irradiance).sum();
+        let count = if nearby.is_some_and(Nearby::is_shaded) { SHADED_DRAWS } else { 1 };
+        for draw in 0..count {
+            let sampler = sampler.split(count, draw);
+            let [choice, place] = IRRADIANCE_PAIRS.map(|dimension| sampler.pair(dimension));
+            let drawn = self.emitters.draw(geometries, point.position, choice.x, place, nearby);
+            let Some(arrival) = drawn.filter(|arrival| point.is_lit_from(arrival.direction)) else { continue };
+            let believed =
+                expected.iter().find(|(entry, ..)| *entry == arrival.entry).map_or(0.0, |(_, seen, _)| *seen);
+            let ends = [point.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
+            let blocked = self.visibility.occluded(point.position, arrival.from, ends, &mut { NO_BLOCKER });
+            let lacks = if blocked { -believed } else { 1.0 - believed };
+            light += arrival.irradiance * (point.cosine(arrival.direction) * lacks / count as f32);
+        }
+        light
     }
 
     /// What of an emitter's light counts for a ray of some density that met it; the rest is that of draws.

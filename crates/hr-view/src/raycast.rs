@@ -323,8 +323,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         if self.mode != Mode::Samples || bounce > 0 || self.followed <= 0.0 {
             return self.solution.irradiance(leaf, hit.uv);
         }
-        let pairs = [4, 5].map(|dimension| sampler.pair(dimension));
-        let direct = self.tracer.irradiance(hit, direction.normalize(), pairs, self.nearby(hit));
+        let direct = self.tracer.irradiance(hit, direction.normalize(), sampler, self.nearby(hit));
         self.solution.indirect_irradiance(leaf, hit.uv) + direct
     }
 

@@ -122,6 +122,11 @@ impl Nearby {
         self.entries[..few].iter().copied().zip(self.seen.iter().copied()).filter(|&(_, seen)| seen > LEAST_SEEN)
     }
 
+    /// Whether something hides parts of emitters from here, or parts of the place from them.
+    pub(super) fn is_shaded(&self) -> bool {
+        self.seen.iter().any(|&seen| seen > LEAST_SEEN && seen < 1.0)
+    }
+
     /// Share of an emitter that is seen, about, > 0.
     pub(super) fn seen(&self, entry: u32) -> f32 {
         self.entries.binary_search(&entry).map_or(BELIEVED, |at| self.seen[at])

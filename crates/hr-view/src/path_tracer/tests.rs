@@ -108,10 +108,7 @@ fn draws(scene: &Scene, count: u32, seed: u32) -> Vec<f64> {
     let hit = rays.closest(origin, direction, START, f32::MAX).expect("the ground");
     let ground = Place { surface: 0, domain: hr_diffuse::Domain::WHOLE, back: false };
     let nearby = Nearby::new(tracer.emitters(), &rays, &ground, seed);
-    let draw = |index| {
-        let sampler = Sampler::new(seed, index);
-        f64::from(tracer.irradiance(&hit, direction, [0, 1].map(|pair| sampler.pair(pair)), Some(&nearby)).x)
-    };
+    let draw = |index| f64::from(tracer.irradiance(&hit, direction, &Sampler::new(seed, index), Some(&nearby)).x);
     (0..count).map(draw).collect()
 }
 
