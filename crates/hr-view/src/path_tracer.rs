@@ -60,7 +60,7 @@ const LEAST_COSINE: f32 = 1e-3;
 const PAIRS: u32 = 4;
 /// Pairs that tell which emitters irradiance is drawn from.
 const IRRADIANCE_PAIRS: [u32; 2] = [4, 5];
-/// Draws for irradiance in half shadow.
+/// Draws for irradiance in half shadow, and where nothing is known.
 const SHADED_DRAWS: u32 = 4;
 
 /// Path traces a scene.
@@ -350,27 +350,36 @@ impl<'a> PathTracer<'a> {
     }
 
     /// Irradiance by emitters where a surface was hit by a ray of the unit `direction`, from one point of one of them, or from a few where it
-    /// is believed to lie in half shadow, by what is known of those `nearby`.
+    /// is believed to lie in half shadow, by what is known of those `nearby`; else from a few of the groups of neighbours.
     ///
     /// Of emitters of which a share s is believed to be seen, that share of all their light u, were nothing between, is known without
     /// chance. A point of density p that sends l and is seen (v = 1) or not (v = 0) adds (v - s) l / p to that, whose mean is what it
     /// lacks (a control variate). Where s is 0 or 1, and right, there is no noise in it; else it may be less than nothing.
     pub fn irradiance(&self, hit: &Hit, direction: Vec3, sampler: &Sampler, nearby: Option<&Nearby>) -> Rgb {
         let Some(point) = self.point(hit, direction) else { return Rgb::ZERO };
+        let Some(nearby) = nearby else {
+            let white = Point { diffuse: Rgb::splat(PI), chances: [0.0; 3], ..point };
+            let draw = |draw| {
+                let sampler = sampler.split(SHADED_DRAWS, draw);
+                let [choice, place] = IRRADIANCE_PAIRS.map(|dimension| sampler.pair(dimension));
+                self.direct_of_groups(&white, choice, place)
+            };
+            return (0..SHADED_DRAWS).map(draw).sum::<Rgb>() / SHADED_DRAWS as f32;
+        };
         let geometries = self.visibility.geometries();
         let normals = [point.place.frame.z_axis, point.true_normal];
-        let expected: SmallVec<[(u32, f32, Rgb); 4]> = (nearby.into_iter().flat_map(Nearby::surely_seen))
+        let expected: SmallVec<[(u32, f32, Rgb); 4]> = (nearby.surely_seen())
             .filter_map(|(entry, seen)| {
                 let unoccluded = self.emitters.unoccluded(geometries, entry, point.position, normals)?;
                 Some((entry, seen, unoccluded * seen))
             })
             .collect();
         let mut light: Rgb = expected.iter().map(|(.., irradiance)| irradiance).sum();
-        let count = if nearby.is_some_and(Nearby::is_shaded) { SHADED_DRAWS } else { 1 };
+        let count = if nearby.is_shaded() { SHADED_DRAWS } else { 1 };
         for draw in 0..count {
             let sampler = sampler.split(count, draw);
             let [choice, place] = IRRADIANCE_PAIRS.map(|dimension| sampler.pair(dimension));
-            let drawn = self.emitters.draw(geometries, point.position, choice.x, place, nearby);
+            let drawn = self.emitters.draw(geometries, point.position, choice.x, place, Some(nearby));
             let Some(arrival) = drawn.filter(|arrival| point.is_lit_from(arrival.direction)) else { continue };
             let believed =
                 expected.iter().find(|(entry, ..)| *entry == arrival.entry).map_or(0.0, |(_, seen, _)| *seen);

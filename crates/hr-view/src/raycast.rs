@@ -48,6 +48,8 @@ const EVEN: f32 = 0.3;
 /// mirrored differs by no more than this share of the lobe's width.
 const SAME_PLACE: f32 = 0.25;
 const SAME_DIRECTION: f32 = 0.1;
+/// It takes as long to find out what a leaf sees of emitters as there are emitters. Of so many light is drawn without that.
+const MOST_NEARBY: usize = 1024;
 /// Rays start this far from their surface (unit space): what rounding needs.
 const START: f32 = 1e-6;
 
@@ -323,7 +325,8 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         if self.mode != Mode::Samples || bounce > 0 || self.followed <= 0.0 {
             return self.solution.irradiance(leaf, hit.uv);
         }
-        let direct = self.tracer.irradiance(hit, direction.normalize(), sampler, self.nearby(hit));
+        let nearby = if self.tracer.emitters().len() <= MOST_NEARBY { self.nearby(hit) } else { None };
+        let direct = self.tracer.irradiance(hit, direction.normalize(), sampler, nearby);
         self.solution.indirect_irradiance(leaf, hit.uv) + direct
     }
 

@@ -200,6 +200,15 @@ impl Emitters {
         entry as usize >= self.glowing
     }
 
+    /// Whether all of an emitter faces one way.
+    pub(super) fn is_flat(&self, entry: u32, geometries: &[Geometry]) -> bool {
+        match &self.entries[entry as usize].source {
+            Source::Surface(glow) => geometries[glow.surface as usize].is_polygon(),
+            Source::Sphere { .. } => false,
+            Source::Light { .. } => true,
+        }
+    }
+
     /// The emitter that a surface is, if it emits.
     #[must_use]
     pub fn of_surface(&self, surface: u32) -> Option<u32> {

@@ -74,9 +74,11 @@ impl Nearby {
             let cosine = arrival.direction.dot(normal);
             (cosine > 0.0).then(|| (arrival.irradiance.element_sum() * cosine.max(LEAST_COSINE), arrival))
         };
+        let is_mesh = emitters.len() > LOOKED_AT;
         let unblocked = |entry: u32| {
-            // Parts that glow are many and small, emitters may be spheres, half of whose points face away.
-            let looks = if emitters.is_glowing(entry) { 2 } else { RAYS };
+            // Parts that glow are many and small, and so are polygons of lamps that are meshes; of what is round half may face away.
+            let is_small = emitters.is_glowing(entry) || is_mesh && emitters.is_flat(entry, geometries);
+            let looks = if is_small { 2 } else { RAYS };
             let light =
                 |k: u32| brings(entry, points[k as usize], point2(hash(seed, 1 + entry), k)).map(|(light, _)| light);
             (0..looks).filter_map(light).sum::<f32>() / looks as f32

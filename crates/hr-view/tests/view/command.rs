@@ -339,7 +339,7 @@ fn kept_solutions_give_the_same_pictures() {
 #[test]
 fn ctrl_c_between_frames_ends_at_once_and_leaves_whole_files() {
     let folder = Folder::new("interrupted");
-    let mut command = command(&["furnace", "--error", "0.5", "--frames", &folder.path("frames")]);
+    let mut command = command(&["furnace", "--error", "0.5", "--mode", "samples", "--frames", &folder.path("frames")]);
     let mut running = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command runs");
     let names = || -> Vec<String> {
         let Ok(entries) = std::fs::read_dir(folder.path("frames")) else { return Vec::new() };
