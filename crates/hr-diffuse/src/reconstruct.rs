@@ -170,6 +170,8 @@ fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, seen: Seen
     };
     let factors: Vec<f32> = (0..vertices.indirect.len() as u32).map(factor).collect();
     for ((irradiance, indirect), factor) in vertices.irradiance.iter_mut().zip(&mut vertices.indirect).zip(factors) {
+        // It is no more than all there is, but for rounding.
+        *indirect = indirect.min(*irradiance);
         *irradiance += *indirect * (factor - 1.0);
         *indirect *= factor;
     }

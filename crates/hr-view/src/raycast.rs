@@ -68,7 +68,7 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     /// Nodes that glow, rising.
     glowing: Vec<u32>,
     /// By node, which emitters light it; found out of leaves where it is asked for.
-    nearby: Vec<OnceLock<Nearby>>,
+    nearby: Vec<OnceLock<Box<Nearby>>>,
 }
 
 /// A point that a ray met.
@@ -430,11 +430,12 @@ impl<B: Basis> Known for RayCaster<'_, B> {
 
     fn nearby(&self, hit: &Hit) -> Option<&Nearby> {
         let leaf = self.solution.leaf(hit)?;
-        Some(self.nearby.get(leaf.index())?.get_or_init(|| {
+        let nearby = self.nearby.get(leaf.index())?.get_or_init(|| {
             let element = &self.solution.elements.nodes[leaf.index()];
             let place = Lit { surface: element.source, domain: element.domain, back: element.kind == Kind::Back };
-            Nearby::new(self.tracer.emitters(), &self.solution.scene.visibility, &place, leaf.0)
-        }))
+            Box::new(Nearby::new(self.tracer.emitters(), &self.solution.scene.visibility, &place, leaf.0))
+        });
+        Some(nearby)
     }
 
     fn glowing(&self, hit: &Hit) -> Option<u32> {

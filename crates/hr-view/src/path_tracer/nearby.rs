@@ -19,8 +19,8 @@ const LOOKED_AT: usize = 64;
 const BELIEVED: f32 = 0.25;
 /// Rays to each of them.
 const RAYS: u32 = 8;
-/// Where more emitters than these bring light it would take too long to look at each of them.
-const FEW: usize = 16;
+/// Emitters that bring less than this share of what is seen are too many to look at each of them.
+const MUCH: f32 = 1.0 / 32.0;
 /// Of an emitter that no ray found so much is believed to be seen.
 const LEAST_SEEN: f32 = 0.1;
 /// Emitters that bring less than this of all are left to power.
@@ -118,10 +118,10 @@ impl Nearby {
         }
     }
 
-    /// The emitters of which some ray saw something, and the share that is seen of each; none where there are many.
+    /// The emitters that bring much, of which some ray saw something, and the share that is seen of each.
     pub(super) fn surely_seen(&self) -> impl Iterator<Item = (u32, f32)> {
-        let few = if self.entries.len() <= FEW { self.entries.len() } else { 0 };
-        self.entries[..few].iter().copied().zip(self.seen.iter().copied()).filter(|&(_, seen)| seen > LEAST_SEEN)
+        let brings_much = |&at: &usize| self.share(at) >= MUCH && self.seen[at] > LEAST_SEEN;
+        (0..self.entries.len()).filter(brings_much).map(|at| (self.entries[at], self.seen[at]))
     }
 
     /// Whether something hides parts of emitters from here, or parts of the place from them.
@@ -150,11 +150,13 @@ impl Nearby {
         if self.entries.is_empty() {
             return by_power;
         }
-        let own = self.entries.binary_search(&entry).map_or(0.0, |at| {
-            let before = at.checked_sub(1).map_or(0.0, |before| self.sums[before]);
-            self.sums[at] - before
-        });
+        let own = self.entries.binary_search(&entry).map_or(0.0, |at| self.share(at));
         BY_POWER * by_power + (1.0 - BY_POWER) * own
+    }
+
+    /// What one of the entries brings of what they all do.
+    fn share(&self, at: usize) -> f32 {
+        self.sums[at] - at.checked_sub(1).map_or(0.0, |before| self.sums[before])
     }
 }
 
