@@ -20,7 +20,7 @@ const BELIEVED: f32 = 0.25;
 /// Rays to each of them.
 const RAYS: u32 = 8;
 /// Emitters that bring less than this share of what is seen are too many to look at each of them.
-const MUCH: f32 = 1.0 / 32.0;
+const MUCH: f32 = 0.01;
 /// Of an emitter that no ray found so much is believed to be seen.
 const LEAST_SEEN: f32 = 0.1;
 /// Emitters that bring less than this of all are left to power.
