@@ -54,39 +54,36 @@ fn final_gathers_are_nearer_to_the_truth_than_their_solutions() {
     }
 }
 
+/// How far pictures of a solution by samples are off, where rays follow all lobes and find emitters, and without them.
+fn off_by_samples(scene: Scene, view: usize, (paths, error): (u32, f32)) -> [f32; 2] {
+    let scene = Arc::new(scene);
+    let camera = Camera { width: 64, height: 48, ..scene.cameras[view].1 };
+    let rays = path_tracer::visibility(&scene).expect("sound");
+    let right = PathTracer::new(&scene, &rays).render(&camera, paths, 1, &|_| ());
+    let right = blocks(&right.image, &camera);
+    let settings = Settings::with_error(error);
+    let solved =
+        Solved::new(Arc::clone(&scene), settings, false, &mut |_| ControlFlow::Continue(())).expect("solvable");
+    [f32::INFINITY, 0.0].map(|width| {
+        let caster = RayCaster::new(&scene, &solved.solution, Mode::Samples).with_followed(width);
+        difference(&blocks(&caster.render(&camera, &|_| ()), &camera), &right, 1.0)
+    })
+}
+
 /// Where all is glossy a sample stands for a sender that looks different from each place: rays tell more than samples do.
 #[test]
 fn rays_into_lobes_are_nearer_to_the_truth_than_samples() {
     let mut scene = Scene::load("cornell").expect("built in");
     scene.materials[0].reflector = Arc::new(Ward::new(Rgb::splat(0.15), Rgb::splat(0.6), 0.2).expect("a gloss"));
-    let scene = Arc::new(scene);
-    let camera = Camera { width: 64, height: 48, ..scene.cameras[0].1 };
-    let rays = path_tracer::visibility(&scene).expect("sound");
-    let right = PathTracer::new(&scene, &rays).render(&camera, 256, 1, &|_| ());
-    let right = blocks(&right.image, &camera);
-    let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.2), false, &mut |_| ControlFlow::Continue(()))
-        .expect("solvable");
-    let [followed, reflected] = [f32::INFINITY, 0.0].map(|width| {
-        let caster = RayCaster::new(&scene, &solved.solution, Mode::Samples).with_followed(width);
-        difference(&blocks(&caster.render(&camera, &|_| ()), &camera), &right, 1.0)
-    });
+    let [followed, reflected] = off_by_samples(scene, 0, (256, 0.2));
     assert!(followed < 0.06 && followed < 0.6 * reflected, "off by {followed}, samples by {reflected}");
 }
 
 /// Of a coarse solution: its leaves are as large as the shadows.
 #[test]
 fn shadows_at_pixels_are_nearer_to_the_truth_than_those_of_vertices() {
-    let scene = Arc::new(Scene::load("cornell").expect("built in"));
-    let camera = Camera { width: 64, height: 48, ..scene.cameras[1].1 };
-    let rays = path_tracer::visibility(&scene).expect("sound");
-    let right = PathTracer::new(&scene, &rays).render(&camera, 1024, 1, &|_| ());
-    let right = blocks(&right.image, &camera);
-    let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.3), false, &mut |_| ControlFlow::Continue(()))
-        .expect("solvable");
-    let [at_pixels, at_vertices] = [f32::INFINITY, 0.0].map(|width| {
-        let caster = RayCaster::new(&scene, &solved.solution, Mode::Samples).with_followed(width);
-        difference(&blocks(&caster.render(&camera, &|_| ()), &camera), &right, 1.0)
-    });
+    let scene = Scene::load("cornell").expect("built in");
+    let [at_pixels, at_vertices] = off_by_samples(scene, 1, (1024, 0.3));
     assert!(at_pixels < 0.025 && at_pixels < 0.7 * at_vertices, "off by {at_pixels}, vertices by {at_vertices}");
 }
 
