@@ -138,7 +138,7 @@ impl<L: LightField> Solution<L> {
         corners.iter().map(|&(vertex, weight)| self.vertices.irradiance[vertex as usize] * weight).sum()
     }
 
-    /// What of [`irradiance`](Self::irradiance) is light that has been reflected before: the rest comes from emitters.
+    /// What of [`irradiance`](Self::irradiance) (W/m²) is light that has been reflected before: the rest comes from emitters.
     #[must_use]
     pub fn indirect_irradiance(&self, leaf: NodeId, uv: Vec2) -> Rgb {
         let corners = self.vertices.interpolation(leaf.0, uv);

@@ -349,7 +349,7 @@ impl<'a> PathTracer<'a> {
         light
     }
 
-    /// Irradiance by emitters where a surface was hit by a ray of the unit `direction`, from one point of one of them, or from a few where it
+    /// Irradiance (W/m²) by emitters where a surface was hit by a ray of the unit `direction`, from one point of one of them, or from a few where it
     /// is believed to lie in half shadow, by what is known of those `nearby`; else from a few of the groups of neighbours.
     ///
     /// Of emitters of which a share s is believed to be seen, that share of all their light u, were nothing between, is known without

@@ -149,8 +149,9 @@ impl<'a, B: Basis> RayCaster<'a, B> {
 
     /// With [`Mode::Samples`]: lobes narrower than `width` (standard deviation in radians) are followed by rays, in wider ones
     /// the samples are reflected that arrive. All are followed by default, as a sample stands for all of a sender, which looks
-    /// different from each place where it is glossy itself, and is more than a lobe's width across where it is near. With 0 there are no
-    /// rays but the pixel's: that is the paper's section 3.4, as the window's graphics device does it, with diffuse light as vertices have it. A pixel of wide lobes takes up to three times as long followed.
+    /// different from each place where it is glossy itself, and is more than a lobe's width across where it is near. A pixel of
+    /// wide lobes takes up to three times as long followed. With 0 there are no rays but the pixel's, and diffuse light is that of
+    /// vertices: the paper's section 3.4, as the window's graphics device does it.
     #[must_use]
     pub fn with_followed(self, width: f32) -> Self {
         Self { followed: width, ..self }
