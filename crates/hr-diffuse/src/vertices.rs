@@ -1,16 +1,21 @@
 //! Vertices for display: every leaf is shown as a fan about its middle, through its corners and through the corners that finer
 //! neighbours put on its edges, so that no crack opens where elements of different size meet. Where other surfaces stand on a
-//! leaf it is cut, and shown as several fans (`contacts.rs`).
+//! leaf it is cut, and shown as several fans (`contacts.rs`); so is one that goes far around a curved surface.
 
-use crate::Rgb;
+use crate::{Domain, Rgb};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use glam::{Vec2, Vec3};
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 use std::collections::HashMap;
 
 /// Light is gathered this far from a vertex toward the middle of its leaf: on an edge or in a corner of a room the
 /// horizon and the rays would graze the neighbouring surface.
 pub(crate) const INSET: f32 = 0.02;
+/// Leaves whose normals differ from their middle's by more than this angle (radians) are shown in parts, as light changes with the
+/// normal, …
+const MOST_TURN: f32 = 0.6;
+/// … unless they are smaller than this share of all area: a part takes as long as a leaf.
+const SMALL: f32 = 3e-5;
 /// Most finer levels that a neighbour may have.
 const EDGE_DEPTH: u32 = 14;
 
@@ -152,9 +157,11 @@ pub(crate) struct Layout {
 pub(crate) fn outlines(scene: &SceneData, elements: &Elements) -> Layout {
     let mut vertices = Vertices::default();
     let mut index: HashMap<Key, u32> = HashMap::new();
-    for leaf in elements.patch_leaves() {
+    let turns = |leaf| turns(scene, elements, leaf).map(move |part| (leaf, part));
+    let domains = || elements.patch_leaves().flat_map(turns);
+    for (leaf, domain) in domains() {
         let element = &elements.nodes[leaf as usize];
-        for uv in scene.surfaces()[element.source as usize].corners(element.domain) {
+        for uv in scene.surfaces()[element.source as usize].corners(domain) {
             let (position, normal) = point_on(scene, elements, leaf, uv);
             let next = vertices.positions.len() as u32;
             let vertex = *index.entry(key(position, normal, element.material)).or_insert(next);
@@ -166,9 +173,9 @@ pub(crate) fn outlines(scene: &SceneData, elements: &Elements) -> Layout {
         }
     }
     let mut parts = Vec::new();
-    for leaf in elements.patch_leaves() {
+    for (leaf, domain) in domains() {
         let element = &elements.nodes[leaf as usize];
-        let corners = scene.surfaces()[element.source as usize].corners(element.domain);
+        let corners = scene.surfaces()[element.source as usize].corners(domain);
         let at = |uv: Vec2| {
             let (position, normal) = point_on(scene, elements, leaf, uv);
             index.get(&key(position, normal, element.material)).copied()
@@ -187,6 +194,23 @@ pub(crate) fn outlines(scene: &SceneData, elements: &Elements) -> Layout {
         parts.push((leaf, outline));
     }
     Layout { vertices, parts }
+}
+
+/// Parts of a leaf whose normals differ little; the leaf itself, where it is flat, small or black.
+fn turns(scene: &SceneData, elements: &Elements, leaf: u32) -> impl Iterator<Item = Domain> {
+    let element = &elements.nodes[leaf as usize];
+    let geometry = &scene.surfaces()[element.source as usize];
+    let is_whole = element.importance <= 0.0 || element.area < SMALL * elements.measure();
+    let turns = |domain: Domain| !is_whole && geometry.normal_cone(domain).angle() > MOST_TURN;
+    let mut parts = SmallVec::<[Domain; 8]>::new();
+    let mut open: SmallVec<[Domain; 8]> = smallvec![element.domain];
+    while let Some(domain) = open.pop() {
+        match geometry.turned_less(domain).filter(|_| turns(domain)) {
+            Some(halves) => open.extend(halves),
+            None => parts.push(domain),
+        }
+    }
+    parts.into_iter()
 }
 
 impl Layout {

@@ -20,9 +20,17 @@ struct Part {
     /// Of the means of the channels.
     squares: f64,
     samples: u32,
+    /// Rays that met it, samples included.
+    covered: u32,
 }
 
-/// Samples of a pixel.
+impl Part {
+    fn mean(&self) -> DVec3 {
+        self.sum / f64::from(self.samples)
+    }
+}
+
+/// Samples of a pixel, by surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pixel {
     parts: Vec<Part>,
@@ -38,24 +46,57 @@ impl Pixel {
                 part.sum += sum;
                 part.squares += squares;
                 part.samples += 1;
+                part.covered += 1;
             }
-            None => self.parts.push(Part { surface, sum, squares, samples: 1 }),
+            None => self.parts.push(Part { surface, sum, squares, samples: 1, covered: 1 }),
         }
+    }
+
+    /// Counts a ray that met a surface, or none, and brings no light: how much of the pixel a surface covers is then known better than
+    /// its light. Whether there is a sample of that surface; where there is none, nothing is counted.
+    pub fn cover(&mut self, surface: Option<u32>) -> bool {
+        let part = self.parts.iter_mut().find(|part| part.surface == surface);
+        let is_known = part.is_some();
+        if let Some(part) = part {
+            part.covered += 1;
+        }
+        is_known
     }
 
     /// Mean radiance; black without samples, and where noise makes it less than nothing, as it may that of a sample.
     #[must_use]
     pub fn radiance(&self) -> Rgb {
-        let sum: DVec3 = self.parts.iter().map(|part| part.sum).sum();
-        (sum / f64::from(self.samples().max(1))).as_vec3().max(Rgb::ZERO)
+        self.mean().as_vec3().max(Rgb::ZERO)
     }
 
-    /// Whether surfaces differ by more than this share of the brightest.
+    fn mean(&self) -> DVec3 {
+        let sum: DVec3 = self.parts.iter().map(|part| part.mean() * f64::from(part.covered)).sum();
+        sum / f64::from(self.rays().max(1))
+    }
+
+    /// Whether several surfaces are seen.
     #[must_use]
-    pub fn has_edge(&self, share: f32) -> bool {
-        let means = || self.parts.iter().map(|part| (part.sum / f64::from(part.samples)).as_vec3());
-        let (low, high) = means().fold((Rgb::INFINITY, Rgb::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
-        (high - low).max_element() > share * high.max_element()
+    pub fn has_edge(&self) -> bool {
+        self.parts.len() > 1
+    }
+
+    /// By how much the surfaces that pixels see differ, in terms of the mean of all: the channel where that is most. Nothing where
+    /// all see one surface, or black.
+    pub fn contrast<'a>(pixels: impl Iterator<Item = &'a Self> + Clone) -> f32 {
+        let parts = || pixels.clone().flat_map(|pixel| &pixel.parts);
+        let first = parts().next().map(|part| part.surface);
+        if parts().all(|part| Some(part.surface) == first) {
+            return 0.0;
+        }
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (mut sum, mut rays) = (DVec3::ZERO, 0.0);
+        for part in parts() {
+            let (mean, covered) = (part.mean(), f64::from(part.covered));
+            (low, high) = (low.min(mean), high.max(mean));
+            (sum, rays) = (sum + mean * covered, rays + covered);
+        }
+        let (difference, mean) = ((high - low).max_element(), (sum / rays).max_element());
+        if mean > 0.0 { (difference / mean) as f32 } else { 0.0 }
     }
 
     /// Standard error of what is seen of the surfaces, were samples independent, in terms of the mean; 0 where nothing is known of it.
@@ -63,17 +104,18 @@ impl Pixel {
     pub fn noise(&self) -> f32 {
         let (mut variance, mut light) = (0.0, 0.0);
         for part in &self.parts {
-            let (n, mean) = (f64::from(part.samples), part.sum.element_sum() / (3.0 * f64::from(part.samples)));
-            light += n * mean;
+            let (n, mean) = (f64::from(part.samples), part.mean().element_sum() / 3.0);
+            let rays = f64::from(part.covered);
+            light += rays * mean;
             if part.samples > 1 {
-                variance += n * n * (part.squares / n - mean * mean).max(0.0) / (n - 1.0);
+                variance += rays * rays * (part.squares / n - mean * mean).max(0.0) / (n - 1.0);
             }
         }
         if light > 0.0 { (variance.sqrt() / light) as f32 } else { 0.0 }
     }
 
-    fn samples(&self) -> u32 {
-        self.parts.iter().map(|part| part.samples).sum()
+    fn rays(&self) -> u32 {
+        self.parts.iter().map(|part| part.covered).sum()
     }
 }
 
@@ -123,10 +165,10 @@ impl Film {
 fn mixed(print: &Print, pixel: &Pixel) -> [u8; 3] {
     let mut light = DVec3::ZERO;
     for part in &pixel.parts {
-        let radiance = (part.sum / f64::from(part.samples)).as_vec3().max(Rgb::ZERO);
-        light += print.linear(radiance).as_dvec3() * f64::from(part.samples);
+        let radiance = part.mean().as_vec3().max(Rgb::ZERO);
+        light += print.linear(radiance).as_dvec3() * f64::from(part.covered);
     }
-    (light / f64::from(pixel.samples().max(1))).to_array().map(|v| (255.0 * srgb_transfer(v)).round() as u8)
+    (light / f64::from(pixel.rays().max(1))).to_array().map(|v| (255.0 * srgb_transfer(v)).round() as u8)
 }
 
 #[cfg(test)]
@@ -186,14 +228,33 @@ mod tests {
         }
         let image = Image { width: 1, height: 1, pixels: vec![pixel.radiance()] };
         assert_eq!(image.pixels[0], Rgb::ONE, "a sixteenth of 16");
-        assert!(!pixel.has_edge(0.1), "one surface has no edge");
+        let contrast = |pixels: &[Pixel]| Pixel::contrast(pixels.iter());
+        assert!(!pixel.has_edge() && contrast(&[pixel.clone(), pixel.clone()]) == 0.0, "one surface has no edge");
         let printed = Film::new(image.clone(), vec![(0, pixel.clone())]).to_srgb8(&MAP, Primaries::Rec709);
         assert_eq!(printed, image.to_srgb8(&MAP, Primaries::Rec709), "printed as its mean");
         pixel.add(None, Rgb::ZERO);
-        assert!(pixel.has_edge(0.1), "what is behind it differs");
-        pixel = Pixel::default();
-        pixel.add(Some(1), Rgb::splat(1.0));
-        pixel.add(Some(2), Rgb::splat(1.05));
-        assert!(!pixel.has_edge(0.1) && pixel.has_edge(0.01), "surfaces that look alike have no edge");
+        assert!(pixel.has_edge() && contrast(&[pixel]) > 1.0, "what is behind it differs");
+        let pixels = [1.0, 1.05].map(|light| {
+            let mut pixel = Pixel::default();
+            pixel.add(Some(light.to_bits()), Rgb::splat(light));
+            pixel
+        });
+        assert!((contrast(&pixels) - 0.05 / 1.025).abs() < 1e-6, "pixels that look alike: {}", contrast(&pixels));
+    }
+
+    #[test]
+    fn surfaces_count_by_what_they_cover() {
+        let mut pixel = Pixel::default();
+        assert!(!pixel.cover(Some(0)), "nothing is known of it");
+        pixel.add(Some(0), Rgb::splat(1.0));
+        pixel.add(Some(0), Rgb::splat(3.0));
+        pixel.add(Some(1), Rgb::splat(10.0));
+        assert_eq!(pixel.radiance(), Rgb::splat(14.0 / 3.0), "by samples");
+        (0..5).for_each(|_| assert!(pixel.cover(Some(1)), "its light is known"));
+        assert_eq!(pixel.radiance(), Rgb::splat(8.0), "two rays of 2, six of 10");
+        let contrast = Pixel::contrast(std::iter::once(&pixel));
+        assert!((contrast - 1.0).abs() < 1e-6, "{contrast}");
+        // Variance of the mean of 2: 1/(2 − 1); it is a quarter of the pixel.
+        assert!((pixel.noise() - 0.25 / 8.0).abs() < 1e-6, "{}", pixel.noise());
     }
 }

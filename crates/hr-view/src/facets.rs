@@ -216,7 +216,7 @@ impl<'a> Maker<'a> {
         };
         for (middle, outline) in solution.vertices.fans(leaf).filter_map(<[Corner]>::split_first) {
             if is_round(geometry) {
-                self.round_leaf(&look, outline, element.domain);
+                self.round_part(&look, outline);
                 continue;
             }
             let middle = self.vertex(&look, middle.vertex, middle.uv);
@@ -227,10 +227,13 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// A leaf of a curved surface: its outline, cut where its edges leave the surface, a grid within, and a strip of
+    /// A part of a leaf of a curved surface: its outline, cut where its edges leave the surface, a grid within, and a strip of
     /// triangles between them.
-    fn round_leaf(&mut self, look: &Look, outline: &[Corner], domain: Domain) {
+    fn round_part(&mut self, look: &Look, outline: &[Corner]) {
         let solution = self.solution;
+        let ends = |(low, high): (Vec2, Vec2), corner: &Corner| (low.min(corner.uv), high.max(corner.uv));
+        let (low, high) = outline.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), ends);
+        let domain = Domain { u0: low.x, v0: low.y, u1: high.x, v1: high.y };
         // Of an edge that is one point, such as a pole, the ends are enough.
         let inner = |i: usize| {
             let corner = &outline[i];

@@ -246,7 +246,7 @@ impl<'a> PathTracer<'a> {
                 *mean = pixel.radiance();
                 let variance = (squares / n - mean.as_dvec3() * mean.as_dvec3()).max(DVec3::ZERO) / (n - 1.0).max(1.0);
                 *sigma = variance.map(f64::sqrt).as_vec3();
-                if pixel.has_edge(0.0) {
+                if pixel.has_edge() {
                     edges.push((y * width + x, pixel));
                 }
             }

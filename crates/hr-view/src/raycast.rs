@@ -16,6 +16,7 @@ use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
 use hr_scene::{Camera, Film, Image, Material, Pixel, Rays, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -23,10 +24,13 @@ use std::sync::{Arc, OnceLock};
 const LOBE_RAYS: usize = 6;
 /// Mirrors in mirrors end here.
 const MOST_BOUNCES: u32 = 4;
-/// Where surfaces meet in a pixel and differ by more than this share, so many times as many more rays tell for a print how much is
-/// seen of each.
-const EDGE: f32 = 0.05;
-const EDGE_ROUNDS: u8 = 3;
+/// Where surfaces that meet in a pixel differ by c times its mean, a grid of n × n rays knows that mean to about 0.3 c / n^1.5. So
+/// many are shot that this is 0.3 divided by …
+const EDGE: f32 = 25.0;
+/// … up to so many, squared.
+const MOST_AT_EDGES: u32 = 10;
+/// Rows of pixels that are done together.
+const BAND: usize = 8;
 /// Where the standard error of a pixel is larger than this share of its light, there are as many more rays for a print as would
 /// make it that small, up to so many times as many. Its neighbours have as many, as some do not know how noisy they are.
 const NOISE: f32 = 0.06;
@@ -111,21 +115,16 @@ struct Shaded {
     light: Rgb,
 }
 
-/// Rounds of rays that a pixel should have more than all have.
-#[derive(Clone, Copy, Default)]
-struct Wanted {
-    at_edge: u8,
-    by_noise: u8,
+/// The pixels around one, itself included, that lie in some rows.
+fn around(width: usize, rows: Range<usize>, x: usize, y: usize) -> impl Iterator<Item = usize> + Clone {
+    (y.saturating_sub(1).max(rows.start)..rows.end.min(y + 2))
+        .flat_map(move |y| (x.saturating_sub(1)..width.min(x + 2)).map(move |x| y * width + x))
 }
 
-impl Wanted {
-    fn by(pixel: &Pixel) -> Self {
-        let times = (pixel.noise() / NOISE).powi(2);
-        Self {
-            at_edge: if pixel.has_edge(EDGE) { EDGE_ROUNDS } else { 0 },
-            by_noise: (times.ceil() - 1.0).clamp(0.0, f32::from(NOISE_ROUNDS)) as u8,
-        }
-    }
+/// Rounds of rays that a pixel should have more than all have.
+fn rounds(pixel: &Pixel) -> u8 {
+    let times = (pixel.noise() / NOISE).powi(2);
+    (times.ceil() - 1.0).clamp(0.0, f32::from(NOISE_ROUNDS)) as u8
 }
 
 impl<'a, B: Basis> RayCaster<'a, B> {
@@ -169,7 +168,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         self.expose(camera, true, watch)
     }
 
-    /// To be printed or not: rays that are more than others have do not enter the image.
+    /// To be printed or not: rays by which a print has less noise do not enter the image.
     fn expose(&self, camera: &Camera, printed: bool, watch: &(dyn Fn(f32) + Sync)) -> Film {
         if self.mode == Mode::Gather {
             let paths = (self.grid * self.grid * GATHERED).next_power_of_two();
@@ -179,33 +178,32 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let rays = camera.rays();
         let mut image = Image::new(camera.width, camera.height);
         let (width, height) = (camera.width as usize, camera.height as usize);
-        let mut wanted = vec![Wanted::default(); image.pixels.len()];
+        let mut wanted = vec![0; image.pixels.len()];
         let done = AtomicU32::new(0);
         let passes = if printed { 2 } else { 1 };
         let tell = || {
             let rows = done.fetch_add(1, Ordering::Relaxed) + 1;
             watch(rows as f32 / (passes * camera.height) as f32);
         };
-        let rows = image.pixels.par_chunks_mut(width).zip(wanted.par_chunks_mut(width));
-        rows.enumerate().for_each(|(y, (row, wanted))| {
-            let mut shared = Shared::default();
-            for (x, (mean, wanted)) in row.iter_mut().zip(wanted).enumerate() {
-                let pixel = self.pixel((eye, &rays), x, y, 0, &mut shared);
-                (*mean, *wanted) = (pixel.radiance(), Wanted::by(&pixel));
+        let bands = image.pixels.par_chunks_mut(BAND * width).zip(wanted.par_chunks_mut(BAND * width));
+        let edges = bands.enumerate().flat_map_iter(|(band, (means, wanted))| {
+            let first = band * BAND;
+            let pixels = self.band((eye, &rays), width, first..first + means.len() / width, &tell);
+            for ((mean, wanted), pixel) in means.iter_mut().zip(wanted).zip(&pixels) {
+                (*mean, *wanted) = (pixel.radiance(), rounds(pixel));
             }
-            tell();
+            let place = move |(at, pixel): (usize, Pixel)| {
+                (printed && pixel.has_edge()).then_some((first * width + at, pixel))
+            };
+            pixels.into_iter().enumerate().filter_map(place)
         });
+        let edges: Vec<_> = edges.collect();
         let rows = if printed { height } else { 0 };
-        let more = (0..rows).into_par_iter().flat_map_iter(|y| {
+        let noisy = (0..rows).into_par_iter().flat_map_iter(|y| {
             let (wanted, tell) = (&wanted, &tell);
             let mut shared = Shared::default();
             let row = move |x: usize| {
-                let around = || {
-                    (y.saturating_sub(1)..height.min(y + 2))
-                        .flat_map(|y| (x.saturating_sub(1)..width.min(x + 2)).map(move |x| y * width + x))
-                };
-                let noise = around().map(|i| wanted[i].by_noise).max().unwrap_or(0);
-                let rounds = noise.max(wanted[y * width + x].at_edge);
+                let rounds = around(width, 0..height, x, y).map(|i| wanted[i]).max().unwrap_or(0);
                 if x + 1 == width {
                     tell();
                 }
@@ -213,8 +211,55 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             };
             (0..width).filter_map(row)
         });
-        let more = more.collect();
-        Film::new(image, more)
+        let noisy: Vec<_> = noisy.collect();
+        // Of a pixel that is both the last one counts.
+        Film::new(image, edges.into_iter().chain(noisy).collect())
+    }
+
+    /// What is seen in the pixels of some rows. How much they see of each surface is known better where those beside them differ, or
+    /// have edges; were that asked of a pixel itself, what is smaller than a pixel would be too dark, as it is seen only where it was
+    /// met.
+    fn band(&self, (eye, rays): (Vec3, &Rays), width: usize, rows: Range<usize>, tell: &dyn Fn()) -> Vec<Pixel> {
+        let mut shared = Shared::default();
+        let mut pixels = Vec::with_capacity(width * rows.len());
+        for y in rows.clone() {
+            pixels.extend((0..width).map(|x| self.pixel((eye, rays), x, y, 0, &mut shared)));
+            tell();
+        }
+        let beside = |at: usize| around(width, 0..rows.len(), at % width, at / width).filter(move |&other| other != at);
+        let contrasts: Vec<_> =
+            (0..pixels.len()).map(|at| Pixel::contrast(beside(at).map(|other| &pixels[other]))).collect();
+        for (at, (pixel, contrast)) in pixels.iter_mut().zip(contrasts).enumerate() {
+            let side = ((EDGE * contrast).powf(2.0 / 3.0).ceil() as u32).min(MOST_AT_EDGES);
+            if side > self.grid {
+                self.cover((eye, rays), at % width, rows.start + at / width, side, pixel, &mut shared);
+            }
+        }
+        pixels
+    }
+
+    /// Finds with a grid of rays how much a pixel sees of each surface. Light is that of the samples there are; what was not seen by
+    /// them has one.
+    fn cover(
+        &self,
+        (eye, rays): (Vec3, &Rays),
+        x: usize,
+        y: usize,
+        side: u32,
+        pixel: &mut Pixel,
+        shared: &mut Shared,
+    ) {
+        let seed = hash(x as u32, y as u32 ^ 0x91e7);
+        for i in 0..side * side {
+            let cell = Vec2::new((i % side) as f32, (i / side) as f32);
+            let direction = rays.within(x, y, (cell + point2(seed, i)) / side as f32);
+            let hit = self.solution.scene.visibility.closest_except(eye, direction, START, f32::MAX, u32::MAX);
+            let surface = hit.map(|hit| hit.surface);
+            if !pixel.cover(surface) {
+                let light = hit.map(|hit| self.toward_eye(hit, direction, 0, &Sampler::new(seed, i), shared));
+                pixel.add(surface, light.unwrap_or(Rgb::ZERO));
+            }
+        }
     }
 
     /// What is seen in a pixel with some rounds of rays more than all have.
@@ -268,10 +313,15 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let visibility = &self.solution.scene.visibility;
         let hit = visibility.closest_except(origin, direction, START, f32::MAX, own);
         let Some(hit) = hit else { return (None, Rgb::ZERO) };
+        (Some(hit.surface), self.toward_eye(hit, direction, bounce, sampler, shared))
+    }
+
+    /// Radiance that is emitted and reflected where a surface was hit, back against `direction`.
+    fn toward_eye(&self, hit: Hit, direction: Vec3, bounce: u32, sampler: &Sampler, shared: &mut Shared) -> Rgb {
         let emitted = if hit.front { self.material(&hit).exitance * FRAC_1_PI } else { Rgb::ZERO };
         let leaf = self.solution.leaf(&hit);
         let reflected = leaf.map(|leaf| self.leaving(hit, leaf, direction, bounce, sampler, shared));
-        (Some(hit.surface), emitted + reflected.unwrap_or(Rgb::ZERO))
+        emitted + reflected.unwrap_or(Rgb::ZERO)
     }
 
     fn material(&self, hit: &Hit) -> &'a Material {

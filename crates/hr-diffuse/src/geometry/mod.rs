@@ -284,6 +284,20 @@ impl Geometry {
         }
     }
 
+    /// Halves of a part, cut along which way its normals turn most: around the axis or around the profile's centre. None where it
+    /// is flat.
+    pub(crate) fn turned_less(&self, domain: Domain) -> Option<[Domain; 2]> {
+        let Self::Revolution(revolution) = self else { return None };
+        let Domain { u0, v0, u1, v1 } = domain;
+        let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
+        let (around, along) = revolution.turns(domain);
+        Some(if around >= along {
+            [Domain { u1: u, ..domain }, Domain { u0: u, ..domain }]
+        } else {
+            [Domain { v1: v, ..domain }, Domain { v0: v, ..domain }]
+        })
+    }
+
     /// Whether the parameters are in a part; its border is.
     #[must_use]
     pub fn contains(&self, domain: Domain, uv: Vec2) -> bool {
