@@ -35,6 +35,7 @@ mod inherited;
 pub mod keep;
 mod kept_weights;
 mod leaf_rows;
+mod leaning;
 pub mod links;
 mod lobes;
 mod misjudged;

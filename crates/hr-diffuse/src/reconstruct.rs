@@ -9,6 +9,7 @@ use crate::footprint::{Footprint, footprint};
 use crate::gather::{Group, carried, share};
 use crate::hooks::LightField;
 use crate::inherited::{Above, inherit};
+use crate::leaning::{Leaning, Sight, is_near};
 use crate::links::{Link, Links};
 use crate::places::Places;
 use crate::push::{Spread, spreads};
@@ -39,6 +40,8 @@ const ALL_PROVED: f32 = 0.97;
 const COVER: f32 = 0.25;
 /// Vertices are changed by no more than this factor to agree with their leaves.
 const MOST_CHANGE: f64 = 1.5;
+/// What near senders lean to changes the reflected light of a vertex by no more than this share.
+const MOST_LEAN: f32 = 0.5;
 /// Vertices that a thread gathers between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 128;
 
@@ -77,6 +80,7 @@ pub(crate) fn reconstruct<L: LightField>(
     let mut rays = 0;
     let chunk = BETWEEN_WATCHES * threads::current_num_threads();
     let mut covered = Vec::with_capacity(count);
+    let mut sights = Vec::new();
     let shares = light.reflected_shares();
     let (spreads, _) = spreads(light, links, Some(error));
     let (from_afar, near) = inherited(light, (links, &spreads, &shares), (&vertices, &places, &gathers));
@@ -121,17 +125,31 @@ pub(crate) fn reconstruct<L: LightField>(
             })
             .collect();
         for (vertex, gathering) in (start..end).zip(part) {
+            sights.extend(gathering.sight.map(|sight| (vertex, sight)));
             rays += u64::from(gathering.rays);
             vertices.irradiance[vertex] = gathering.irradiance;
             covered.push(gathering.covered);
             vertices.indirect[vertex] = gathering.indirect;
         }
     }
+    lean(light, &mut vertices, &sights);
     agree(light, &mut vertices, seen);
     uncover(&mut vertices, &covered, &is_seen);
     within.fill(light, &mut vertices);
     let unseen = is_seen.iter().filter(|&&is_seen| !is_seen).count() as u64;
     (vertices, Cost { rays, within: within.count(), unseen })
+}
+
+/// Adds what near senders bring as they are not as bright everywhere.
+fn lean<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, sights: &[(usize, Sight)]) {
+    let leaning = Leaning::new(light, vertices);
+    let more: Vec<Rgb> = sights.par_iter().with_min_len(16).map(|(_, sight)| leaning.beside(light, sight)).collect();
+    for ((vertex, _), more) in sights.iter().zip(more) {
+        let most = vertices.indirect[*vertex] * MOST_LEAN;
+        let more = more.clamp(-most, most);
+        vertices.irradiance[*vertex] += more;
+        vertices.indirect[*vertex] += more;
+    }
 }
 
 /// The mean of the leaves around a vertex.
@@ -244,6 +262,7 @@ fn gather_at<L: LightField>(
     let (mut rays, mut row) = (0, Row { emitters, own: 0.0, inherited: rest });
     let mut known_here: SmallVec<[u32; 64]> = SmallVec::new();
     let mut footprint: Option<Footprint> = None;
+    let mut near_senders = SmallVec::new();
     // Share of the view through links of which it is proved how much they let through.
     let mut proved = 0.0;
     for Arriving { irradiance, share: view, mut visibility, sender } in arriving {
@@ -269,6 +288,9 @@ fn gather_at<L: LightField>(
         }
         let group = Group::of(light, sender);
         (if known { &mut own } else { &mut kept })[group as usize] += irradiance * visibility.abs();
+        if known && group != Group::Light && is_near(light, x, sender) {
+            near_senders.push((sender, visibility.abs()));
+        }
         reflected[usize::from(!known)][group as usize] += irradiance * (visibility.abs() * shares[sender as usize]);
         *match group {
             Group::Light => continue,
@@ -289,7 +311,8 @@ fn gather_at<L: LightField>(
     let irradiance = own[0] + kept[0] + (own[1] + kept[1] + (own[2] + kept[2] * inherited) * rest) * all;
     let [known, others] = reflected;
     let indirect = (known[1] + others[1] + (known[2] + others[2] * inherited) * rest) * all;
-    Gathering { irradiance, indirect, rays, covered }
+    let sight = (!near_senders.is_empty()).then_some(Sight { at: x, normal: n, senders: near_senders });
+    Gathering { irradiance, indirect, rays, covered, sight }
 }
 
 /// Where the random numbers of a vertex begin: those of vertices in the same place, on both sides of a cut, are the same.
@@ -412,6 +435,7 @@ struct Gathering {
     indirect: Rgb,
     rays: u32,
     covered: bool,
+    sight: Option<Sight>,
 }
 
 /// Light of one link at a vertex, unoccluded, and the share of the vertex's view that its sender takes up.

@@ -2,8 +2,8 @@
 //! neighbours put on its edges, so that no crack opens where elements of different size meet. Where other surfaces stand on a
 //! leaf it is cut, and shown as several fans (`contacts.rs`); so is one that goes far around a curved surface.
 
-use crate::{Domain, Rgb};
 use crate::hierarchy::{Elements, Kind, SceneData};
+use crate::{Domain, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::{SmallVec, smallvec};
 use std::collections::HashMap;

@@ -192,9 +192,8 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             for ((mean, wanted), pixel) in means.iter_mut().zip(wanted).zip(&pixels) {
                 (*mean, *wanted) = (pixel.radiance(), rounds(pixel));
             }
-            let place = move |(at, pixel): (usize, Pixel)| {
-                (printed && pixel.has_edge()).then_some((first * width + at, pixel))
-            };
+            let place =
+                move |(at, pixel): (usize, Pixel)| (printed && pixel.has_edge()).then_some((first * width + at, pixel));
             pixels.into_iter().enumerate().filter_map(place)
         });
         let edges: Vec<_> = edges.collect();
@@ -240,15 +239,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
 
     /// Finds with a grid of rays how much a pixel sees of each surface. Light is that of the samples there are; what was not seen by
     /// them has one.
-    fn cover(
-        &self,
-        (eye, rays): (Vec3, &Rays),
-        x: usize,
-        y: usize,
-        side: u32,
-        pixel: &mut Pixel,
-        shared: &mut Shared,
-    ) {
+    fn cover(&self, (eye, rays): (Vec3, &Rays), x: usize, y: usize, side: u32, pixel: &mut Pixel, shared: &mut Shared) {
         let seed = hash(x as u32, y as u32 ^ 0x91e7);
         for i in 0..side * side {
             let cell = Vec2::new((i % side) as f32, (i / side) as f32);
