@@ -234,7 +234,7 @@ mod tests {
         assert_eq!(printed, image.to_srgb8(&MAP, Primaries::Rec709), "printed as its mean");
         pixel.add(None, Rgb::ZERO);
         assert!(pixel.has_edge() && contrast(&[pixel]) > 1.0, "what is behind it differs");
-        let pixels = [1.0, 1.05].map(|light| {
+        let pixels = [1.0_f32, 1.05].map(|light| {
             let mut pixel = Pixel::default();
             pixel.add(Some(light.to_bits()), Rgb::splat(light));
             pixel
