@@ -19,7 +19,7 @@ use crate::segments::visibility_at;
 use crate::solution::Seen;
 use crate::threads::{self, prelude::*};
 use crate::transport::{Light, negligible};
-use crate::vertices::{Vertices, outlines, point_on};
+use crate::vertices::{Vertices, outlines_of_parts, point_on};
 use crate::within::Within;
 use crate::{Facing, NodeId, Rgb};
 use glam::{Vec2, Vec3};
@@ -64,7 +64,7 @@ pub(crate) fn reconstruct<L: LightField>(
     (error, seen): (f32, Seen<'_>),
     watch: &mut dyn FnMut(f32) -> ControlFlow<()>,
 ) -> (Vertices, Cost) {
-    let mut layout = outlines(light.scene, light.elements);
+    let mut layout = outlines_of_parts(light.scene, light.elements);
     let contacts = Contacts::new(light.scene, light.elements, &layout);
     contacts.cut(light.elements, &mut layout);
     let mut vertices = layout.fans(light.scene, light.elements);

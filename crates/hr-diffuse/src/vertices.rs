@@ -155,10 +155,19 @@ pub(crate) struct Layout {
 
 /// Finds the corners of all leaves, and the outlines through them.
 pub(crate) fn outlines(scene: &SceneData, elements: &Elements) -> Layout {
+    layout(scene, elements, |leaf| smallvec![elements.nodes[leaf as usize].domain])
+}
+
+/// The same for display: of leaves that turn, parts of them.
+pub(crate) fn outlines_of_parts(scene: &SceneData, elements: &Elements) -> Layout {
+    layout(scene, elements, |leaf| turns(scene, elements, leaf))
+}
+
+/// Finds the corners of leaves or their parts, and the outlines through them.
+fn layout(scene: &SceneData, elements: &Elements, parts_of: impl Fn(u32) -> SmallVec<[Domain; 8]>) -> Layout {
     let mut vertices = Vertices::default();
     let mut index: HashMap<Key, u32> = HashMap::new();
-    let turns = |leaf| turns(scene, elements, leaf).map(move |part| (leaf, part));
-    let domains = || elements.patch_leaves().flat_map(turns);
+    let domains = || elements.patch_leaves().flat_map(|leaf| parts_of(leaf).into_iter().map(move |part| (leaf, part)));
     for (leaf, domain) in domains() {
         let element = &elements.nodes[leaf as usize];
         for uv in scene.surfaces()[element.source as usize].corners(domain) {
@@ -197,7 +206,7 @@ pub(crate) fn outlines(scene: &SceneData, elements: &Elements) -> Layout {
 }
 
 /// Parts of a leaf whose normals differ little; the leaf itself, where it is flat, small or black.
-fn turns(scene: &SceneData, elements: &Elements, leaf: u32) -> impl Iterator<Item = Domain> {
+fn turns(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Domain; 8]> {
     let element = &elements.nodes[leaf as usize];
     let geometry = &scene.surfaces()[element.source as usize];
     let is_whole = element.importance <= 0.0 || element.area < SMALL * elements.measure();
@@ -210,7 +219,7 @@ fn turns(scene: &SceneData, elements: &Elements, leaf: u32) -> impl Iterator<Ite
             None => parts.push(domain),
         }
     }
-    parts.into_iter()
+    parts
 }
 
 impl Layout {
