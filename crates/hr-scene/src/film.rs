@@ -82,7 +82,7 @@ impl Pixel {
 
     /// By how much the surfaces that pixels see differ, in terms of the mean of all: the channel where that is most. Nothing where
     /// all see one surface, or black.
-    pub fn contrast<'a>(pixels: impl Iterator<Item = &'a Self> + Clone) -> f32 {
+    pub fn contrast<'a>(pixels: &(impl Iterator<Item = &'a Self> + Clone)) -> f32 {
         let parts = || pixels.clone().flat_map(|pixel| &pixel.parts);
         let first = parts().next().map(|part| part.surface);
         if parts().all(|part| Some(part.surface) == first) {
@@ -228,7 +228,7 @@ mod tests {
         }
         let image = Image { width: 1, height: 1, pixels: vec![pixel.radiance()] };
         assert_eq!(image.pixels[0], Rgb::ONE, "a sixteenth of 16");
-        let contrast = |pixels: &[Pixel]| Pixel::contrast(pixels.iter());
+        let contrast = |pixels: &[Pixel]| Pixel::contrast(&pixels.iter());
         assert!(!pixel.has_edge() && contrast(&[pixel.clone(), pixel.clone()]) == 0.0, "one surface has no edge");
         let printed = Film::new(image.clone(), vec![(0, pixel.clone())]).to_srgb8(&MAP, Primaries::Rec709);
         assert_eq!(printed, image.to_srgb8(&MAP, Primaries::Rec709), "printed as its mean");
@@ -252,7 +252,7 @@ mod tests {
         assert_eq!(pixel.radiance(), Rgb::splat(14.0 / 3.0), "by samples");
         (0..5).for_each(|_| assert!(pixel.cover(Some(1)), "its light is known"));
         assert_eq!(pixel.radiance(), Rgb::splat(8.0), "two rays of 2, six of 10");
-        let contrast = Pixel::contrast(std::iter::once(&pixel));
+        let contrast = Pixel::contrast(&std::iter::once(&pixel));
         assert!((contrast - 1.0).abs() < 1e-6, "{contrast}");
         // Variance of the mean of 2: 1/(2 − 1); it is a quarter of the pixel.
         assert!((pixel.noise() - 0.25 / 8.0).abs() < 1e-6, "{}", pixel.noise());

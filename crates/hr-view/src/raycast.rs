@@ -227,7 +227,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         }
         let beside = |at: usize| around(width, 0..rows.len(), at % width, at / width).filter(move |&other| other != at);
         let contrasts: Vec<_> =
-            (0..pixels.len()).map(|at| Pixel::contrast(beside(at).map(|other| &pixels[other]))).collect();
+            (0..pixels.len()).map(|at| Pixel::contrast(&beside(at).map(|other| &pixels[other]))).collect();
         for (at, (pixel, contrast)) in pixels.iter_mut().zip(contrasts).enumerate() {
             let side = ((EDGE * contrast).powf(2.0 / 3.0).ceil() as u32).min(MOST_AT_EDGES);
             if side > self.grid {

@@ -54,7 +54,6 @@ fn lamps_have_smooth_edges_in_prints_and_radiance_stays_as_it_is() {
             (off(&film.to_srgb8(&map, scene.primaries)), off(&film.image.to_srgb8(&map, scene.primaries)));
         // Paths of a final gather know a share of a pixel to 0.5/√64 = 0.06 at worst, and to half of that on average, as they are spread
         // evenly; rays that look for edges are more.
-        println!("{printed} {averaged}");
         assert!(printed < 0.02, "{mode:?}: {printed} off");
         assert!(averaged > 5.0 * printed, "{mode:?}: {averaged} off were it averaged as radiance");
     }
