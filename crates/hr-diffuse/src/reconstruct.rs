@@ -142,6 +142,9 @@ pub(crate) fn reconstruct<L: LightField>(
 
 /// Adds what near senders bring as they are not as bright everywhere.
 fn lean<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, sights: &[(usize, Sight)]) {
+    if sights.is_empty() {
+        return;
+    }
     let leaning = Leaning::new(light, vertices);
     let more: Vec<Rgb> = sights.par_iter().with_min_len(16).map(|(_, sight)| leaning.beside(light, sight)).collect();
     for ((vertex, _), more) in sights.iter().zip(more) {
@@ -288,7 +291,8 @@ fn gather_at<L: LightField>(
         }
         let group = Group::of(light, sender);
         (if known { &mut own } else { &mut kept })[group as usize] += irradiance * visibility.abs();
-        if known && group != Group::Light && is_near(light, x, sender) {
+        // What reflects nothing sends evenly.
+        if known && shares[sender as usize] > 0.0 && is_near(light, x, sender) {
             near_senders.push((sender, visibility.abs()));
         }
         reflected[usize::from(!known)][group as usize] += irradiance * (visibility.abs() * shares[sender as usize]);
@@ -450,8 +454,10 @@ struct Arriving {
 mod tests {
     use super::*;
     use crate::form_factor::point_to_polygon;
+    use crate::vertices::INSET;
     use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
     use glam::DVec3;
+    use std::f32::consts::FRAC_1_PI;
 
     /// Below the ceiling of a unit room; its front faces down.
     const LAMP: [DVec3; 4] = [
@@ -555,5 +561,56 @@ mod tests {
             all += right;
         }
         assert!(leaves.len() <= 2 && off < 0.08 * all, "{} leaves: off by {off} of {all}", leaves.len());
+    }
+
+    /// A wall sees mostly what is next to it of a floor, which is dark there and bright below a lamp farther on.
+    #[test]
+    fn corners_are_lit_by_what_is_next_to_them() {
+        const STEPS: u32 = 200;
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let quad = |o: DVec3, a: DVec3, b: DVec3| Shape::Quad([o, o + a, o + a + b, o + b]);
+        let lamp = [(0.7, 0.4), (0.7, 0.6), (0.9, 0.6), (0.9, 0.4)].map(|(x, y)| DVec3::new(x, y, 0.4));
+        let material = |reflectance, exitance| DiffuseMaterial {
+            reflectance: Rgb::splat(reflectance),
+            exitance: Rgb::splat(exitance),
+            two_sided: false,
+        };
+        let shapes = [quad(DVec3::ZERO, x, y), quad(DVec3::ZERO, y, z), Shape::Quad(lamp)];
+        let input = SceneInput {
+            surfaces: shapes.into_iter().zip(0..).map(|(shape, material)| Surface::new(shape, material)).collect(),
+            materials: vec![material(0.8, 0.0), material(0.001, 0.0), material(0.0, 1.0)],
+            ..SceneInput::default()
+        };
+        let mut solver = Solver::new(&input, Settings::with_error(0.3), ()).expect("three surfaces");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        let solution = solver.finish(&mut |_| ControlFlow::Continue(()));
+        let vertices = &solution.vertices;
+        let to_unit = |at: DVec3| solution.scene.normalization.to_unit(at);
+        let (lamp, area) = (lamp.map(to_unit), to_unit(x).distance(to_unit(DVec3::ZERO)).powi(2));
+        let mut floor = Vec::new();
+        for i in 0..STEPS * STEPS {
+            let uv = (Vec2::new((i % STEPS) as f32, (i / STEPS) as f32) + 0.5) / STEPS as f32;
+            let at = to_unit(uv.as_dvec2().extend(0.0));
+            floor.push((at, 0.8 * point_to_polygon(at, Vec3::Z, &lamp)));
+        }
+        // What is reflected to a vertex of the wall, a little inside of it: ours, and the sum over small parts of the floor.
+        let nodes = &solution.elements.nodes;
+        let gathered = |uv: Vec2| {
+            let on_wall = |&at: &usize| nodes[vertices.leaf[at] as usize].source == 1 && vertices.uv[at] == uv;
+            let vertex = (0..vertices.positions.len()).find(on_wall).expect("the wall reflects a little");
+            let middle = nodes[vertices.leaf[vertex] as usize].center;
+            let (at, normal) = (vertices.positions[vertex].lerp(middle, INSET), vertices.normals[vertex]);
+            let from = |&(from, sent): &(Vec3, f32)| {
+                let to = from - at;
+                let distance2 = to.length_squared();
+                sent * to.dot(normal).max(0.0) * (-to.z).max(0.0) / (distance2 * distance2)
+            };
+            let right = floor.iter().map(from).sum::<f32>() * area * FRAC_1_PI / floor.len() as f32;
+            [vertices.indirect[vertex].x, right]
+        };
+        let [corner, middle] = [Vec2::ZERO, Vec2::splat(0.5)].map(gathered);
+        // How bright both are together is what the wall's element says.
+        let [ours, right] = [0, 1].map(|k| corner[k] / middle[k]);
+        assert!((ours / right - 1.0).abs() < 0.1, "the corner has {ours} of the middle's light, not {right}");
     }
 }

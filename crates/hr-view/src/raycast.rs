@@ -29,6 +29,8 @@ const MOST_BOUNCES: u32 = 4;
 const EDGE: f32 = 25.0;
 /// … up to so many, squared.
 const MOST_AT_EDGES: u32 = 10;
+/// Pixels are printed surface by surface where these differ by more than this share of the mean.
+const ALIKE: f32 = 0.05;
 /// Rows of pixels that are done together.
 const BAND: usize = 8;
 /// Where the standard error of a pixel is larger than this share of its light, there are as many more rays for a print as would
@@ -121,10 +123,24 @@ fn around(width: usize, rows: Range<usize>, x: usize, y: usize) -> impl Iterator
         .flat_map(move |y| (x.saturating_sub(1)..width.min(x + 2)).map(move |x| y * width + x))
 }
 
-/// Rounds of rays that a pixel should have more than all have.
+/// Rays that a pixel should have more than all have.
+#[derive(Clone, Copy, Default)]
+struct Wanted {
+    /// Rounds of them, for its noise.
+    rounds: u8,
+    /// Side of the grid that tells how much is seen of each surface; 0 where none is needed.
+    side: u8,
+}
+
+/// Rounds of rays that make a print of a pixel less noisy.
 fn rounds(pixel: &Pixel) -> u8 {
     let times = (pixel.noise() / NOISE).powi(2);
     (times.ceil() - 1.0).clamp(0.0, f32::from(NOISE_ROUNDS)) as u8
+}
+
+/// A place in a pixel: one in each cell of a square grid.
+fn stratified(side: u32, i: u32, seed: u32) -> Vec2 {
+    (Vec2::new((i % side) as f32, (i / side) as f32) + point2(seed, i)) / side as f32
 }
 
 impl<'a, B: Basis> RayCaster<'a, B> {
@@ -178,7 +194,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let rays = camera.rays();
         let mut image = Image::new(camera.width, camera.height);
         let (width, height) = (camera.width as usize, camera.height as usize);
-        let mut wanted = vec![0; image.pixels.len()];
+        let mut wanted = vec![Wanted::default(); image.pixels.len()];
         let done = AtomicU32::new(0);
         let passes = if printed { 2 } else { 1 };
         let tell = || {
@@ -188,12 +204,10 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let bands = image.pixels.par_chunks_mut(BAND * width).zip(wanted.par_chunks_mut(BAND * width));
         let edges = bands.enumerate().flat_map_iter(|(band, (means, wanted))| {
             let first = band * BAND;
-            let pixels = self.band((eye, &rays), width, first..first + means.len() / width, &tell);
-            for ((mean, wanted), pixel) in means.iter_mut().zip(wanted).zip(&pixels) {
-                (*mean, *wanted) = (pixel.radiance(), rounds(pixel));
-            }
-            let place =
-                move |(at, pixel): (usize, Pixel)| (printed && pixel.has_edge()).then_some((first * width + at, pixel));
+            let pixels = self.band((eye, &rays), width, first, wanted, &tell);
+            means.iter_mut().zip(&pixels).for_each(|(mean, pixel)| *mean = pixel.radiance());
+            let is_printed = move |pixel: &Pixel| printed && Pixel::contrast(&std::iter::once(pixel)) > ALIKE;
+            let place = move |(at, pixel): (usize, Pixel)| is_printed(&pixel).then_some((first * width + at, pixel));
             pixels.into_iter().enumerate().filter_map(place)
         });
         let edges: Vec<_> = edges.collect();
@@ -202,11 +216,16 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             let (wanted, tell) = (&wanted, &tell);
             let mut shared = Shared::default();
             let row = move |x: usize| {
-                let rounds = around(width, 0..height, x, y).map(|i| wanted[i]).max().unwrap_or(0);
+                let rounds = around(width, 0..height, x, y).map(|i| wanted[i].rounds).max().unwrap_or(0);
                 if x + 1 == width {
                     tell();
                 }
-                (rounds > 0).then(|| (y * width + x, self.pixel((eye, &rays), x, y, u32::from(rounds), &mut shared)))
+                (rounds > 0).then(|| {
+                    let mut pixel = self.pixel((eye, &rays), x, y, u32::from(rounds), &mut shared);
+                    let side = u32::from(wanted[y * width + x].side);
+                    self.cover((eye, &rays), (x, y), side, &mut pixel, &mut shared);
+                    (y * width + x, pixel)
+                })
             };
             (0..width).filter_map(row)
         });
@@ -215,35 +234,50 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         Film::new(image, edges.into_iter().chain(noisy).collect())
     }
 
-    /// What is seen in the pixels of some rows. How much they see of each surface is known better where those beside them differ, or
-    /// have edges; were that asked of a pixel itself, what is smaller than a pixel would be too dark, as it is seen only where it was
-    /// met.
-    fn band(&self, (eye, rays): (Vec3, &Rays), width: usize, rows: Range<usize>, tell: &dyn Fn()) -> Vec<Pixel> {
-        let mut shared = Shared::default();
-        let mut pixels = Vec::with_capacity(width * rows.len());
-        for y in rows.clone() {
-            pixels.extend((0..width).map(|x| self.pixel((eye, rays), x, y, 0, &mut shared)));
+    /// What is seen in rows of pixels from the `first` on, and what is wanted for each. How much they see of each surface is known better
+    /// where those beside them differ, or have edges; were that asked of a pixel itself, what is smaller than a pixel would be too
+    /// dark, as it is seen only where it was met.
+    fn band(
+        &self,
+        (eye, rays): (Vec3, &Rays),
+        width: usize,
+        first: usize,
+        wanted: &mut [Wanted],
+        tell: &dyn Fn(),
+    ) -> Vec<Pixel> {
+        let (mut shared, count) = (Shared::default(), wanted.len());
+        let mut pixels = Vec::with_capacity(count);
+        for y in 0..count / width {
+            pixels.extend((0..width).map(|x| self.pixel((eye, rays), x, first + y, 0, &mut shared)));
             tell();
         }
-        let beside = |at: usize| around(width, 0..rows.len(), at % width, at / width).filter(move |&other| other != at);
-        let contrasts: Vec<_> =
-            (0..pixels.len()).map(|at| Pixel::contrast(&beside(at).map(|other| &pixels[other]))).collect();
-        for (at, (pixel, contrast)) in pixels.iter_mut().zip(contrasts).enumerate() {
-            let side = ((EDGE * contrast).powf(2.0 / 3.0).ceil() as u32).min(MOST_AT_EDGES);
-            if side > self.grid {
-                self.cover((eye, rays), at % width, rows.start + at / width, side, pixel, &mut shared);
-            }
+        for (at, wanted) in wanted.iter_mut().enumerate() {
+            let around = around(width, 0..count / width, at % width, at / width);
+            let beside = around.filter(|&other| other != at).map(|other| &pixels[other]);
+            let side = (EDGE * Pixel::contrast(&beside)).powf(2.0 / 3.0).ceil() as u32;
+            let side = if side > self.grid { side.min(MOST_AT_EDGES) as u8 } else { 0 };
+            *wanted = Wanted { rounds: rounds(&pixels[at]), side };
+        }
+        for (at, (pixel, wanted)) in pixels.iter_mut().zip(wanted).enumerate() {
+            let place = (at % width, first + at / width);
+            self.cover((eye, rays), place, u32::from(wanted.side), pixel, &mut shared);
         }
         pixels
     }
 
     /// Finds with a grid of rays how much a pixel sees of each surface. Light is that of the samples there are; what was not seen by
     /// them has one.
-    fn cover(&self, (eye, rays): (Vec3, &Rays), x: usize, y: usize, side: u32, pixel: &mut Pixel, shared: &mut Shared) {
+    fn cover(
+        &self,
+        (eye, rays): (Vec3, &Rays),
+        (x, y): (usize, usize),
+        side: u32,
+        pixel: &mut Pixel,
+        shared: &mut Shared,
+    ) {
         let seed = hash(x as u32, y as u32 ^ 0x91e7);
         for i in 0..side * side {
-            let cell = Vec2::new((i % side) as f32, (i / side) as f32);
-            let direction = rays.within(x, y, (cell + point2(seed, i)) / side as f32);
+            let direction = rays.within(x, y, stratified(side, i, seed));
             let hit = self.solution.scene.visibility.closest_except(eye, direction, START, f32::MAX, u32::MAX);
             let surface = hit.map(|hit| hit.surface);
             if !pixel.cover(surface) {
@@ -261,12 +295,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         shared.middle = None;
         for i in 0..all * (1 + rounds) {
             let sampler = Sampler::new(seed, i);
-            let within = if i < all {
-                let cell = Vec2::new((i % self.grid) as f32, (i / self.grid) as f32);
-                (cell + point2(seed, i)) / self.grid as f32
-            } else {
-                sampler.pair(0)
-            };
+            let within = if i < all { stratified(self.grid, i, seed) } else { sampler.pair(0) };
             let direction = rays.within(x, y, within);
             let (surface, light) = self.seen(eye, direction, u32::MAX, 0, &sampler, shared);
             pixel.add(surface, light);
