@@ -14,8 +14,9 @@ use smallvec::SmallVec;
 
 /// Senders are near whose radius is larger than this share of their distance.
 const NEAR: f32 = 0.2;
-/// Side of the grid of points by which it is found which parts of a leaf are seen most.
-const GRID: u32 = 8;
+/// Side of the grid of points by which it is found which parts of a leaf are seen most: of one that is farther than its radius, and
+/// of a nearer one.
+const GRIDS: [u32; 2] = [4, 8];
 /// A leaf's light changes by no more than this share.
 const MOST: f32 = 0.5;
 
@@ -26,6 +27,17 @@ pub(crate) struct Sight {
     pub(crate) normal: Vec3,
     /// Each with its visibility.
     pub(crate) senders: SmallVec<[(u32, f32); 4]>,
+    /// What is negligible there (see [`negligible`](crate::transport::negligible)).
+    pub(crate) negligible: f32,
+}
+
+impl Sight {
+    /// How much of a small part of a surface is seen, but for its area, given a point of it and the normal there.
+    fn sees(&self, (point, normal): (Vec3, Vec3)) -> f32 {
+        let to = point - self.at;
+        let distance2 = to.length_squared().max(f32::MIN_POSITIVE);
+        to.dot(self.normal).max(0.0) * (-to.dot(normal)).max(0.0) / (distance2 * distance2)
+    }
 }
 
 /// By node, how the irradiance of a leaf changes with (u, v).
@@ -71,15 +83,23 @@ impl Leaning {
 
     fn from<L: LightField>(&self, light: Light<'_, L>, sight: &Sight, sender: u32) -> Rgb {
         let element = light.element(sender);
-        if !is_near(light, sight.at, sender) {
+        let weakened = sight.at.distance_squared(element.center) * sight.negligible;
+        let matters = |light: Rgb| light.max_element() * element.radius * element.radius > weakened;
+        if !is_near(light, sight.at, sender) || !matters(light.exitant.range[sender as usize][1] * MOST) {
             return Rgb::ZERO;
         }
         if element.child_count > 0 {
             let children = element.first_child..element.first_child + element.child_count;
             return children.map(|child| self.from(light, sight, child)).sum();
         }
-        let [along_u, along_v] = self.slopes[sender as usize];
-        if !element.is_patch() || element.reflectance == Rgb::ZERO || along_u == Rgb::ZERO && along_v == Rgb::ZERO {
+        if !element.is_patch() || element.reflectance == Rgb::ZERO {
+            return Rgb::ZERO;
+        }
+        // What is seen most is within the leaf, so that no more than this can change.
+        let ([along_u, along_v], Domain { u0, v0, u1, v1 }) = (self.slopes[sender as usize], element.domain);
+        let across = along_u.abs() * (u1 - u0).abs() + along_v.abs() * (v1 - v0).abs();
+        let most = across.min(light.exitant.irradiance[sender as usize] * MOST);
+        if !matters(element.reflectance * most) {
             return Rgb::ZERO;
         }
         let factor = light.factor_at(sight.at, sight.normal, sender);
@@ -87,7 +107,6 @@ impl Leaning {
             return Rgb::ZERO;
         }
         let shift = shift(light, sight, sender);
-        let most = light.exitant.irradiance[sender as usize] * MOST;
         let change = (along_u * shift.x + along_v * shift.y).clamp(-most, most);
         element.reflectance * change * factor
     }
@@ -96,23 +115,37 @@ impl Leaning {
 /// From the middle of a leaf to that of what a point sees of it, in (u, v).
 fn shift<L: LightField>(light: Light<'_, L>, sight: &Sight, sender: u32) -> Vec2 {
     let element = light.element(sender);
-    let is_triangle = light.scene.surfaces()[element.source as usize].corners(Domain::WHOLE).len() == 3;
-    let (mut all, mut seen, mut weight) = (Vec2::ZERO, Vec2::ZERO, 0.0);
-    for i in 0..GRID * GRID {
-        let mut share = (Vec2::new((i % GRID) as f32, (i / GRID) as f32) + 0.5) / GRID as f32;
+    let geometry = &light.scene.surfaces()[element.source as usize];
+    let Domain { u0, v0, u1, v1 } = element.domain;
+    let size = Vec2::new(u1 - u0, v1 - v0);
+    let point = |share: Vec2| point_on(light.scene, light.elements, sender, element.domain.lerp(share.x, share.y));
+    let grid = GRIDS[usize::from(sight.at.distance(element.center) < element.radius)];
+    if !geometry.is_polygon() {
+        return size * mean_share((grid, false), |share| sight.sees(point(share)));
+    }
+    // Points of polygons need not be looked up one by one.
+    let [origin, end_u, end_v] = [Vec2::ZERO, Vec2::X, Vec2::Y].map(|share| point(share).0);
+    let is_triangle = geometry.corners(Domain::WHOLE).len() == 3;
+    let (along_u, along_v) = (end_u - origin, end_v - origin);
+    let twist = if is_triangle { Vec3::ZERO } else { point(Vec2::ONE).0 - end_u - along_v };
+    let on_plane = |share: Vec2| origin + along_u * share.x + along_v * share.y + twist * (share.x * share.y);
+    size * mean_share((grid, is_triangle), |share| sight.sees((on_plane(share), element.normals.axis)))
+}
+
+/// How far the mean of a grid of points in the unit square, or its lower triangle, weighted by `weight`, is from that of all of them.
+fn mean_share((grid, is_triangle): (u32, bool), weight: impl Fn(Vec2) -> f32) -> Vec2 {
+    let (mut all, mut seen, mut total) = (Vec2::ZERO, Vec2::ZERO, 0.0);
+    for i in 0..grid * grid {
+        let mut share = (Vec2::new((i % grid) as f32, (i / grid) as f32) + 0.5) / grid as f32;
         if is_triangle && share.x + share.y > 1.0 {
             share = 1.0 - share;
         }
-        let uv = element.domain.lerp(share.x, share.y);
-        let (point, normal) = point_on(light.scene, light.elements, sender, uv);
-        let to = point - sight.at;
-        let distance2 = to.length_squared().max(f32::MIN_POSITIVE);
-        let sees = to.dot(sight.normal).max(0.0) * (-to.dot(normal)).max(0.0) / (distance2 * distance2);
-        all += uv;
-        seen += uv * sees;
-        weight += sees;
+        let weight = weight(share);
+        all += share;
+        seen += share * weight;
+        total += weight;
     }
-    if weight > 0.0 { seen / weight - all / (GRID * GRID) as f32 } else { Vec2::ZERO }
+    if total > 0.0 { seen / total - all / (grid * grid) as f32 } else { Vec2::ZERO }
 }
 
 #[cfg(test)]
@@ -153,12 +186,14 @@ mod tests {
                 right += 0.5 * uv.x * factor;
                 even += 0.5 * 0.5 * factor;
             }
-            let ours = leaning.beside(light, &Sight { at, normal, senders: smallvec![(leaf, 1.0)] }).x;
+            let ours = leaning.beside(light, &Sight { at, normal, senders: smallvec![(leaf, 1.0)], negligible: 0.0 }).x;
             assert!((even + ours - right).abs() < 0.07 * right, "at {place}: {even} + {ours}, not {right}");
-            let half = leaning.beside(light, &Sight { at, normal, senders: smallvec![(leaf, 0.5)] }).x;
+            let half = leaning.beside(light, &Sight { at, normal, senders: smallvec![(leaf, 0.5)], negligible: 0.0 }).x;
             assert!((half - 0.5 * ours).abs() < 1e-6, "half of it is seen");
-            let afar =
-                leaning.beside(light, &Sight { at: at + 9.0 * Vec3::Z, normal, senders: smallvec![(leaf, 1.0)] });
+            let afar = leaning.beside(
+                light,
+                &Sight { at: at + 9.0 * Vec3::Z, normal, senders: smallvec![(leaf, 1.0)], negligible: 0.0 },
+            );
             assert_eq!(afar, Rgb::ZERO, "from afar all is seen alike");
         }
     }

@@ -315,7 +315,7 @@ fn gather_at<L: LightField>(
     let irradiance = own[0] + kept[0] + (own[1] + kept[1] + (own[2] + kept[2] * inherited) * rest) * all;
     let [known, others] = reflected;
     let indirect = (known[1] + others[1] + (known[2] + others[2] * inherited) * rest) * all;
-    let sight = (!near_senders.is_empty()).then_some(Sight { at: x, normal: n, senders: near_senders });
+    let sight = (!near_senders.is_empty()).then_some(Sight { at: x, normal: n, senders: near_senders, negligible });
     Gathering { irradiance, indirect, rays, covered, sight }
 }
 
