@@ -144,12 +144,18 @@ impl Haar {
         decode(self.vertices[usize::from(vertex)])
     }
 
+    /// The values at three vertices.
+    #[inline]
+    fn at_vertices(&self, [a, b, c]: [u16; 3]) -> [Rgb; 3] {
+        [self.vertex(a), self.vertex(b), self.vertex(c)]
+    }
+
     /// Values at midpoints, linear where there is no vertex. In units of the scale.
     #[inline]
     fn mid_values(&self, corners: [Rgb; 3], node: Node) -> [Rgb; 3] {
-        let between = midpoints(corners);
-        let mids = node.mids();
-        [0, 1, 2].map(|e| if mids[e] == Node::NO_VERTEX { between[e] } else { self.vertex(mids[e]) })
+        let (between, mids) = (midpoints(corners), node.mids());
+        let at = |edge: usize| if mids[edge] == Node::NO_VERTEX { between[edge] } else { self.vertex(mids[edge]) };
+        [at(0), at(1), at(2)]
     }
 
     /// The value in a direction, which need not have unit length. Zero for a direction that is zero or not finite.
@@ -171,7 +177,7 @@ impl Haar {
         while let Some(index) = node {
             let here = self.node(index);
             if here.is_childless() && !here.is_divided() {
-                let values = corners.map(|v| self.vertex(v));
+                let values = self.at_vertices(corners);
                 let child = descend(&mut at);
                 let [a, b, c] = child.corners(values, self.mid_values(values, here));
                 return interpolate(at, a, b, c) * self.scale;
@@ -180,7 +186,7 @@ impl Haar {
             corners = child.corners(corners, here.mids());
             node = here.child(child.index());
         }
-        let [a, b, c] = corners.map(|v| self.vertex(v));
+        let [a, b, c] = self.at_vertices(corners);
         interpolate(at, a, b, c) * self.scale
     }
 
@@ -209,7 +215,7 @@ impl Haar {
 
     /// Extends bounds by what a cone touches under a triangle. Pieces whose values are within them already are not looked at.
     fn bound_below(&self, visit: &Visit, cone: &ConeTest, range: &mut (Rgb, Rgb)) {
-        let values = || visit.vertices.map(|v| self.vertex(v));
+        let values = || self.at_vertices(visit.vertices);
         let bound = |triangle: &Triangle, values: [Rgb; 3], range: &mut (Rgb, Rgb)| {
             triangle.bound(values, cone, PIECE_SPLITS, &mut range.0, &mut range.1);
         };
@@ -308,7 +314,7 @@ impl Haar {
         if !enter(visit) {
             return;
         }
-        let values = || visit.vertices.map(|v| self.vertex(v));
+        let values = || self.at_vertices(visit.vertices);
         let Some(index) = visit.node else {
             return piece(&visit.triangle, values());
         };
