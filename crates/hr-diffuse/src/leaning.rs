@@ -190,6 +190,10 @@ mod tests {
             assert!((even + ours - right).abs() < 0.07 * right, "at {place}: {even} + {ours}, not {right}");
             let half = leaning.beside(light, &Sight { at, normal, senders: smallvec![(leaf, 0.5)], negligible: 0.0 }).x;
             assert!((half - 0.5 * ours).abs() < 1e-6, "half of it is seen");
+            for negligible in [0.01, 0.1, 1.0].map(|share| share * right) {
+                let rough = leaning.beside(light, &Sight { at, normal, senders: smallvec![(leaf, 1.0)], negligible }).x;
+                assert!((rough - ours).abs() <= negligible, "no more is missing than is negligible: {rough}, {ours}");
+            }
             let afar = leaning.beside(
                 light,
                 &Sight { at: at + 9.0 * Vec3::Z, normal, senders: smallvec![(leaf, 1.0)], negligible: 0.0 },

@@ -29,6 +29,9 @@ const MOST_BOUNCES: u32 = 4;
 const EDGE: f32 = 25.0;
 /// … up to so many, squared.
 const MOST_AT_EDGES: u32 = 10;
+/// A quarter of these rays comes first. Where they and the pixel's own meet one surface, the edge is beside the pixel, and what they may have
+/// missed is too small to show, unless surfaces differ by more than so many times the mean, as lamps do.
+const PLAIN: f32 = 2.0;
 /// Pixels are printed surface by surface where these differ by more than this share of the mean.
 const ALIKE: f32 = 0.05;
 /// Rows of pixels that are done together.
@@ -130,6 +133,8 @@ struct Wanted {
     rounds: u8,
     /// Side of the grid that tells how much is seen of each surface; 0 where none is needed.
     side: u8,
+    /// Whether a quarter of it is enough where that meets one surface.
+    plain: bool,
 }
 
 /// Rounds of rays that make a print of a pixel less noisy.
@@ -222,8 +227,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
                 }
                 (rounds > 0).then(|| {
                     let mut pixel = self.pixel((eye, &rays), x, y, u32::from(rounds), &mut shared);
-                    let side = u32::from(wanted[y * width + x].side);
-                    self.cover((eye, &rays), (x, y), side, &mut pixel, &mut shared);
+                    self.cover((eye, &rays), (x, y), wanted[y * width + x], &mut pixel, &mut shared);
                     (y * width + x, pixel)
                 })
             };
@@ -254,13 +258,14 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         for (at, wanted) in wanted.iter_mut().enumerate() {
             let around = around(width, 0..count / width, at % width, at / width);
             let beside = around.filter(|&other| other != at).map(|other| &pixels[other]);
-            let side = (EDGE * Pixel::contrast(&beside)).powf(2.0 / 3.0).ceil() as u32;
+            let contrast = Pixel::contrast(&beside);
+            let side = (EDGE * contrast).powf(2.0 / 3.0).ceil() as u32;
             let side = if side > self.grid { side.min(MOST_AT_EDGES) as u8 } else { 0 };
-            *wanted = Wanted { rounds: rounds(&pixels[at]), side };
+            *wanted = Wanted { rounds: rounds(&pixels[at]), side, plain: contrast <= PLAIN };
         }
         for (at, (pixel, wanted)) in pixels.iter_mut().zip(wanted).enumerate() {
             let place = (at % width, first + at / width);
-            self.cover((eye, rays), place, u32::from(wanted.side), pixel, &mut shared);
+            self.cover((eye, rays), place, *wanted, pixel, &mut shared);
         }
         pixels
     }
@@ -271,12 +276,18 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         &self,
         (eye, rays): (Vec3, &Rays),
         (x, y): (usize, usize),
-        side: u32,
+        wanted: Wanted,
         pixel: &mut Pixel,
         shared: &mut Shared,
     ) {
-        let seed = hash(x as u32, y as u32 ^ 0x91e7);
-        for i in 0..side * side {
+        let (seed, side) = (hash(x as u32, y as u32 ^ 0x91e7), u32::from(wanted.side));
+        let is_first = |i: &u32| ((i / side) | (i % side)).is_multiple_of(2);
+        let all = 0..side * side;
+        let firsts = side.div_ceil(2).pow(2) as usize;
+        for (count, i) in all.clone().filter(is_first).chain(all.filter(|i| !is_first(i))).enumerate() {
+            if count == firsts && wanted.plain && !pixel.has_edge() {
+                return;
+            }
             let direction = rays.within(x, y, stratified(side, i, seed));
             let hit = self.solution.scene.visibility.closest_except(eye, direction, START, f32::MAX, u32::MAX);
             let surface = hit.map(|hit| hit.surface);
@@ -578,5 +589,42 @@ fn glow<B: Basis>(solution: &Solution<GlossyField<B>>, node: u32, light: f32) ->
         back: element.kind == Kind::Back,
         radiance: Rgb::splat(light),
         area: element.area,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solved::{Purpose, Solved, Wanted as Wait};
+    use hr_diffuse::Settings;
+
+    /// Where a quarter of the rays that look for edges meets what the pixel saw, the others bring next to nothing.
+    #[test]
+    fn edges_beside_a_pixel_need_no_close_look() {
+        const SIDE: u8 = 8;
+        let scene = Arc::new(Scene::load("room").expect("built in"));
+        let mut camera = scene.default_camera();
+        (camera.width, camera.height) = (90, 60);
+        let cameras = [camera];
+        let purpose = Purpose { distributions: true, cameras: Some(&cameras[..]) };
+        let settings = Settings::with_error(0.5);
+        let asked = Solved::awaited(Arc::clone(&scene), settings, purpose, &mut |_| Wait::Whole);
+        let solved = asked.expect("a sound scene").0;
+        let caster = RayCaster::new(&scene, &solved.solution, Mode::Distributions);
+        let view = (solved.solution.scene.normalization.to_unit(DVec3::from(camera.eye)), &camera.rays());
+        let (mut shared, mut off, mut light, mut early) = (Shared::default(), 0.0, 0.0, 0);
+        for (x, y) in (0..60).flat_map(|y| (0..90).map(move |x| (x, y))) {
+            let seen = caster.pixel(view, x, y, 0, &mut shared);
+            let [quick, thorough] = [true, false].map(|plain| {
+                let mut pixel = seen.clone();
+                caster.cover(view, (x, y), Wanted { rounds: 0, side: SIDE, plain }, &mut pixel, &mut shared);
+                pixel
+            });
+            early += usize::from(quick != thorough);
+            off += (quick.radiance() - thorough.radiance()).abs().element_sum();
+            light += thorough.radiance().element_sum();
+        }
+        assert!(early > 3_000, "most pixels see one surface: {early}");
+        assert!(off < 1e-3 * light, "{:.5} of the light", off / light);
     }
 }
