@@ -47,6 +47,8 @@ const WEAK_PER_ERROR: f32 = 3.0;
 const WEAK_SHARE: f32 = 0.3;
 /// Of a leaf's samples, the directions of so many strongest ones are told to the projection as peaks.
 const PEAKS: usize = 12;
+/// Peaks are found with others that are no more than so many times as wide.
+const AS_WIDE: f32 = 1.2;
 
 /// Reflectances and shares of radiances that are clamped by less are approximations, and not counted.
 const CLAMPED: f32 = 0.01;
@@ -320,29 +322,38 @@ impl Material {
     }
 }
 
-/// The strongest of the lobes that the samples make, in world directions.
+/// The strongest of the lobes that the samples make, in world directions: parts of one lamp make one of them.
 fn peaks(reflection: &Reflection<'_>) -> Vec<Peak> {
     let Reflection { material, place, incident, narrowest, .. } = reflection;
     let mut strongest: Vec<&Incident> = incident.iter().filter(|i| reflection.around || i.direction.z > 0.05).collect();
     let strength = |i: &Incident| i.irradiance.max_element() / (i.extent * i.extent + 1e-4);
     strongest.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
-    strongest.truncate(PEAKS);
-    strongest
-        .into_iter()
-        .map(|sample| {
-            // By reciprocity the lobe of the incident direction is where it is reflected to.
-            let lobe = material.reflector.lobe(sample.direction.with_z(sample.direction.z.abs()));
-            let mirrored = Vec3::new(-sample.direction.x, -sample.direction.y, sample.direction.z);
-            let (direction, width) = if reflection.around {
-                (mirrored, lobe.width)
-            } else if material.mirror.is_some() {
-                (mirrored, MIRROR_ALPHA)
-            } else {
-                (lobe.direction.try_normalize().unwrap_or(mirrored), lobe.width)
-            };
-            Peak { direction: place.frame * direction, width: width.max(*narrowest).max(sample.extent) }
-        })
-        .collect()
+    let mut peaks: Vec<Peak> = Vec::with_capacity(PEAKS);
+    for sample in strongest {
+        // By reciprocity the lobe of the incident direction is where it is reflected to.
+        let lobe = material.reflector.lobe(sample.direction.with_z(sample.direction.z.abs()));
+        let mirrored = Vec3::new(-sample.direction.x, -sample.direction.y, sample.direction.z);
+        let (direction, width) = if reflection.around {
+            (mirrored, lobe.width)
+        } else if material.mirror.is_some() {
+            (mirrored, MIRROR_ALPHA)
+        } else {
+            (lobe.direction.try_normalize().unwrap_or(mirrored), lobe.width)
+        };
+        let peak = Peak { direction: place.frame * direction, width: width.max(*narrowest).max(sample.extent) };
+        if !peaks.iter().any(|other| is_found(&peak, other)) {
+            peaks.push(peak);
+        }
+        if peaks.len() == PEAKS {
+            break;
+        }
+    }
+    peaks
+}
+
+/// Whether a projection that looks closely at one peak finds another one, too.
+fn is_found(peak: &Peak, with: &Peak) -> bool {
+    with.width <= AS_WIDE * peak.width && with.direction.dot(peak.direction) > with.width.min(FRAC_PI_2).cos()
 }
 
 /// Scales samples, each renewed for a place on its own, so that together they are the irradiance that arrived there.

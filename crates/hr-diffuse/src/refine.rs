@@ -13,7 +13,7 @@ use crate::geometry::Domain;
 use crate::hierarchy::{Element, Elements, Kind};
 use crate::hooks::LightField;
 use crate::links::Link;
-use crate::lobes::Shares;
+use crate::lobes::Lobes;
 use crate::oracle::{FactorBounds, factor_bounds};
 use crate::proofs;
 use crate::rooms::are_apart;
@@ -175,7 +175,7 @@ pub(crate) fn refine<L: LightField>(
         .collect();
     wave.extend(unlit.into_iter().map(|pair| Candidate { pair, link: None }));
     let counters = Counters::default();
-    let shares = Shares::new(light.elements, light.faint, light.field);
+    let lobes = Lobes::new(light.elements, light.faint, light.field);
     while !wave.is_empty() {
         refined.pairs += wave.len() as u64;
         let reader = light.read();
@@ -189,7 +189,7 @@ pub(crate) fn refine<L: LightField>(
             let stopped = refined.stopped || refined.spent.is_some();
             let decided = part.par_iter().with_min_len(32).map(|candidate| {
                 let inherited = if stopped { inherited(reader, candidate) } else { None };
-                let decided = || decide(reader, candidate, (tolerance, &shares), stopped, &counters);
+                let decided = || decide(reader, candidate, (tolerance, &lobes), stopped, &counters);
                 let keep = |link| if candidate.own().is_some() { Verdict::Keep(link) } else { Verdict::Inherit(link) };
                 inherited.map_or_else(decided, keep)
             });
@@ -355,6 +355,11 @@ struct Interval {
 }
 
 impl Interval {
+    /// What a receiver's lobe shows of how uneven the sender is.
+    fn seen_with(self, contrast: f32) -> Self {
+        Self { radiosity: self.radiosity * contrast, directional: self.directional * contrast, ..self }
+    }
+
     fn error(&self) -> f32 {
         self.geometry + RADIOSITY_SHARE * self.radiosity + DIRECTIONAL_SHARE * self.directional
     }
@@ -388,7 +393,7 @@ fn interval<L: LightField>(
 fn decide<L: LightField>(
     light: Light<'_, L>,
     candidate: &Candidate,
-    (tolerance, shares): (Tolerance, &Shares),
+    (tolerance, lobes): (Tolerance, &Lobes),
     stopped: bool,
     counters: &Counters,
 ) -> Verdict {
@@ -416,8 +421,8 @@ fn decide<L: LightField>(
         return Verdict::Facing;
     };
     let weight = light.weight(pair.receiver);
-    let share = shares.of(pair.receiver, r.material);
-    let interval = interval(light, pair, &bounds, (tolerance.error / weight, share));
+    let (share, contrast) = (lobes.share(light, pair.receiver), lobes.contrast(light, pair.receiver, pair.sender));
+    let interval = interval(light, pair, &bounds, (tolerance.error / weight, share)).seen_with(contrast);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
     let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);
@@ -470,14 +475,16 @@ fn decide<L: LightField>(
     };
     // What corners of the receiver tell of a shadow's edge, which segments from all over it miss or take for a soft one.
     let split_by_edge = |link: &Link| {
-        let (brought, splittable) = (estimate(light, link), r.is_patch() && can_split(r, tolerance));
-        let seen = stake(link) > tolerance.shadow && shadows::counts(light, pair.receiver, brought);
-        if link.visibility < 0.0 || !splittable || !seen || stopped {
+        if link.visibility < 0.0 || stopped || !r.is_patch() || !can_split(r, tolerance) {
+            return None;
+        }
+        let (stake, brought) = (stake(link) * contrast, estimate(light, link) * contrast);
+        if stake <= tolerance.shadow || !shadows::counts(light, pair.receiver, brought) {
             return None;
         }
         let (edge, rays) = shadows::edge(light, pair.receiver, pair.sender);
         counters.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
-        let found = stake(link) * edge > tolerance.shadow;
+        let found = stake * edge > tolerance.shadow;
         counters.edges.fetch_add(u64::from(found), Ordering::Relaxed);
         found.then_some(Verdict::SplitReceiver)
     };

@@ -7,6 +7,7 @@
 use crate::hierarchy::Kind;
 use crate::hooks::LightField;
 use crate::links::Links;
+use crate::lobes::Lobes;
 use crate::refine::{MutableLight, Tolerance, can_split, estimate};
 use crate::segments::visibility_at;
 use crate::threads::prelude::*;
@@ -68,11 +69,11 @@ pub(crate) fn sew<L: LightField>(
     tolerance: Tolerance,
     watch: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> u64 {
-    let mut rays = 0;
+    let (mut rays, lobes) = (0, Lobes::new(light.elements, light.faint, light.field));
     loop {
         let (reader, leaves) = (light.read(), outlines(light.scene, light.elements).parts);
         let look = |(leaf, outline): &(u32, Outline)| {
-            let (torn, rays) = is_torn(reader, links, tolerance, *leaf, outline);
+            let (torn, rays) = is_torn(reader, (links, &lobes), tolerance, *leaf, outline);
             (torn.then_some(*leaf), u64::from(rays))
         };
         let looked: Vec<(Option<u32>, u64)> = leaves.par_iter().with_min_len(64).map(look).collect();
@@ -88,7 +89,7 @@ pub(crate) fn sew<L: LightField>(
 /// Whether the edge of a shadow reaches into a leaf where smaller ones touch it, and the rays that were shot to know.
 fn is_torn<L: LightField>(
     light: Light<'_, L>,
-    links: &Links,
+    (links, lobes): (&Links, &Lobes),
     tolerance: Tolerance,
     leaf: u32,
     outline: &[Corner],
@@ -106,7 +107,7 @@ fn is_torn<L: LightField>(
     let (mut node, mut rays) = (leaf, 0);
     loop {
         for link in links.of(node).iter().filter(|link| link.visibility >= 0.0) {
-            let brought = estimate(light, link);
+            let brought = estimate(light, link) * lobes.contrast(light, leaf, link.sender);
             if weight * brought > tolerance.shadow && counts(light, leaf, brought) {
                 let (edge, shot) = between(light, leaf, link.sender, places());
                 rays += shot;

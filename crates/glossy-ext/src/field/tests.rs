@@ -189,3 +189,27 @@ fn highlights_move_over_a_leaf_with_the_eye() {
     assert!(worst < 0.03, "the highlight is off by {worst} of the leaf's width");
     assert!(least > 0.1, "without its focus the leaf would show it off by {least} at least");
 }
+
+/// A large lamp in parts, each a peak of its own, and a small one beside it, which is seen as brightly.
+#[test]
+fn parts_of_one_lamp_hide_no_other() {
+    let metal: Arc<dyn Reflector> = Arc::new(MetallicRoughness::new(Rgb::ONE, 1.0, 0.2).expect("a metal"));
+    let width = metal.lobe(Vec3::Z).width;
+    let field = GlossyField::new(&[metal], Refinement::default());
+    let part =
+        |k: u16| Vec3::new(0.6 + 0.4 * width * f32::from(k % 5), 0.4 * width * f32::from(k / 5), 0.9).normalize();
+    let small = Vec3::new(-0.5, -0.3, 0.8).normalize();
+    let floor = Floor { points: (0..25).map(part).chain([small]).collect() };
+    let (mut incident, mut irradiance) = (SampleSet::new(), Rgb::ZERO);
+    for (k, &direction) in floor.points.iter().enumerate() {
+        let sample = Rgb::splat(if direction == small { 0.5 } else { 1.0 });
+        let sender = NodeId(k as u32 + 1);
+        field.receive(&mut incident, &Transfer { sender, direction, irradiance: sample, oriented: true });
+        irradiance += sample;
+    }
+    let arrived = Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible: 0.0, error: 0.5, shown: true };
+    let reflection = field.reflection(&floor, FLOOR, &[&incident], arrived).expect("it is lit");
+    let toward = Vec3::new(-small.x, -small.y, small.z);
+    let (shown, right) = (field.project(&reflection).eval(toward).x, reflection.toward(toward).x);
+    assert!((shown / right - 1.0).abs() < 0.1, "the small one is {shown}, not {right}");
+}
