@@ -18,6 +18,9 @@ const SHARP: f32 = 0.5;
 /// Width of the lobe of a diffuse receiver: the standard deviation per axis (radians) of directions by their cosine.
 const COSINE: f32 = 0.6;
 
+/// No lobe counts as narrower than this (radians): a mirror would show a point of light in no direction at all, and edges without end.
+const NARROWEST: f32 = 0.03;
+
 /// The lobe of a material.
 #[derive(Clone, Copy, Debug)]
 struct Lobe {
@@ -39,7 +42,7 @@ impl Lobes {
     /// Of materials with `faint` lobes, whose light travels as diffuse light, little shows where it comes from, however sharp they are.
     pub(crate) fn new<L: LightField>(elements: &Elements, faint: &[Rgb], field: &L) -> Self {
         let lobe = |(material, faint): (u32, &Rgb)| {
-            let width = field.lobe_width(material);
+            let width = field.lobe_width(material).map(|width| width.max(NARROWEST));
             let width = if *faint == Rgb::ZERO { width } else { width.map(|width| width.max(TYPICAL_LOBE)) };
             Lobe { width, albedo: field.active(material).map_or(0.0, Rgb::max_element) }
         };
@@ -173,6 +176,7 @@ mod tests {
     #[test]
     fn edges_are_finer_in_highlights() {
         let leaves = |field| solve(&room(), 0.1, field, Skips::ALL).stats.leaves as f64;
+        assert_eq!(leaves(Looking(0.0, 0.3)), leaves(Looking(NARROWEST, 0.3)), "mirrors are no sharper than that");
         let [evenly, broad, sharp] =
             [(0.6, 0.0), (0.6, 0.3), (0.05, 0.3)].map(|(width, albedo)| leaves(Looking(width, albedo)));
         assert!(
