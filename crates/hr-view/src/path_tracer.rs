@@ -15,6 +15,7 @@ mod emitters;
 mod groups;
 mod nearby;
 mod sampler;
+mod spherical;
 #[cfg(test)]
 mod tests;
 
@@ -293,10 +294,11 @@ impl<'a> PathTracer<'a> {
             first = first.or(Some(hit.surface));
             let emitted = self.emitted(&hit);
             if emitted != Rgb::ZERO {
-                light += throughput * emitted * self.share_of_emission(&hit, direction, density, nearby.into());
+                light += throughput * emitted * self.share_of_emission(origin, &hit, direction, density, nearby.into());
             }
             if let Some(entry) = known.glowing(&hit) {
-                let other = self.emitters.density(entry, hit.t, hit.normal.dot(direction).abs(), nearby.into());
+                let seen = [hit.t, hit.normal.dot(direction).abs()];
+                let other = self.emitters.density(self.visibility.geometries(), entry, origin, seen, nearby.into());
                 throughput *= power_heuristic(density, other);
             }
             if let Some(reflected) = known.end(&Ray { hit: &hit, direction, density, bounce }) {
@@ -342,8 +344,8 @@ impl<'a> PathTracer<'a> {
             let Some(step) = point.step(0.0, *turn) else { continue };
             let met = self.visibility.closest_except(point.position, step.direction, START, f32::MAX, point.surface);
             let Some(met) = met else { continue };
-            let emitted =
-                self.emitted(&met) * self.share_of_emission(&met, step.direction, step.density, Draws::OfGroups);
+            let emitted = self.emitted(&met)
+                * self.share_of_emission(point.position, &met, step.direction, step.density, Draws::OfGroups);
             light += step.weight * (emitted + beyond(&met, step.direction)) / turns.len() as f32;
         }
         light
@@ -391,10 +393,11 @@ impl<'a> PathTracer<'a> {
         light
     }
 
-    /// What of an emitter's light counts for a ray of some density that met it; the rest is that of draws.
-    fn share_of_emission(&self, hit: &Hit, direction: Vec3, density: f32, draws: Draws<'_>) -> f32 {
-        let Some(entry) = self.emitters.of_surface(hit.surface) else { return 1.0 };
-        power_heuristic(density, self.emitters.density(entry, hit.t, -hit.normal.dot(direction), draws))
+    /// What of an emitter's light counts for a ray of some density from `origin` that met it; the rest is that of draws.
+    fn share_of_emission(&self, origin: Vec3, hit: &Hit, direction: Vec3, density: f32, draws: Draws<'_>) -> f32 {
+        let Some(entry) = self.emitters.of_surface(hit.surface).filter(|_| density.is_finite()) else { return 1.0 };
+        let seen = [hit.t, -hit.normal.dot(direction)];
+        power_heuristic(density, self.emitters.density(self.visibility.geometries(), entry, origin, seen, draws))
     }
 
     /// Radiance that a surface emits where it was hit.

@@ -4,6 +4,7 @@
 use super::STEP;
 use super::groups::Groups;
 use super::nearby::Nearby;
+use super::spherical::Spherical;
 use glam::{Vec2, Vec3};
 use hr_diffuse::beams::spot_ramp;
 use hr_diffuse::form_factor::{point_to_sphere, point_to_surface};
@@ -13,6 +14,8 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Farther than anything in the unit cube is from anything else in it.
 const FAR: f32 = 2.0;
+/// Polygons that are farther than so many of their radii are far.
+const NEAR: f32 = 2.5;
 
 /// The emitters of a scene, in unit space.
 #[derive(Clone, Debug)]
@@ -36,6 +39,8 @@ struct Entry {
     source: Source,
     /// Chance to be drawn by power alone.
     chance: f32,
+    /// Where it is worth asking whether it is [`Spherical`]: a middle, and a squared distance from it; 0 for what is no polygon.
+    near: (Vec3, f32),
 }
 
 #[derive(Clone, Debug)]
@@ -170,7 +175,8 @@ impl Emitters {
             }
             let chance = power / total;
             sum += chance;
-            entries.push(Entry { source, chance });
+            let near = (middle(&source), reach(geometries, &source).powi(2));
+            entries.push(Entry { source, chance, near });
             chances.push(sum);
         }
         Self { entries, chances, entry_of, glowing: first, candidates, groups: Groups::new(&grouped) }
@@ -270,21 +276,40 @@ impl Emitters {
     pub(super) fn shine(&self, geometries: &[Geometry], at: Vec3, entry: u32, u: Vec2, chance: f32) -> Option<Arrival> {
         match &self.entries[entry as usize].source {
             Source::Surface(glow) => {
-                let (from, front, weight) = geometries[glow.surface as usize].sample_area(glow.domain, u.x, u.y);
-                let normal = if glow.back { -front } else { front };
-                let to = from - at;
-                let distance2 = to.length_squared();
-                let direction = to / distance2.sqrt();
-                let cosine = -normal.dot(direction);
-                (distance2 > 0.0 && cosine > 0.0).then(|| Arrival {
+                let geometry = &geometries[glow.surface as usize];
+                let facing = |front: Vec3| if glow.back { -front } else { front };
+                let (from, direction, extent, density) = if let Some(spherical) = self.spherical(geometries, entry, at)
+                {
+                    let direction = spherical.direction(u)?;
+                    let (on, front) = geometry.sample(glow.domain, 0.5, 0.5);
+                    let normal = facing(front);
+                    let distance = (on - at).dot(normal) / direction.dot(normal);
+                    let extent = spherical.solid_angle();
+                    let shines = direction.dot(normal) < 0.0 && distance > 0.0 && distance < FAR;
+                    shines.then_some((at + direction * distance, direction, extent, extent.recip()))?
+                } else {
+                    let (from, front, weight) = geometry.sample_area(glow.domain, u.x, u.y);
+                    let to = from - at;
+                    let distance2 = to.length_squared();
+                    let direction = to / distance2.sqrt();
+                    let cosine = -facing(front).dot(direction);
+                    let shines = distance2 > 0.0 && cosine > 0.0;
+                    shines.then_some((
+                        from,
+                        direction,
+                        cosine * weight / distance2,
+                        distance2 / (glow.area * cosine),
+                    ))?
+                };
+                Some(Arrival {
                     from,
                     entry,
                     surface: Some(glow.surface),
                     glow: self.is_glowing(entry).then_some((entry, glow.radiance.x)),
                     seen: 1.0,
                     direction,
-                    irradiance: glow.radiance * (cosine * weight / (distance2 * chance)),
-                    density: self.presence(chance) * distance2 / (glow.area * cosine),
+                    irradiance: glow.radiance * (extent / chance),
+                    density: self.presence(chance) * density,
                 })
             }
             Source::Sphere { surface, center, radius, radiance } => {
@@ -368,13 +393,32 @@ impl Emitters {
         (chance * self.candidates as f32).min(1.0)
     }
 
+    /// An emitter that is a polygon and fills much of what is seen from a point.
+    fn spherical(&self, geometries: &[Geometry], entry: u32, at: Vec3) -> Option<Spherical> {
+        let Entry { source: Source::Surface(glow), near: (middle, reach2), .. } = &self.entries[entry as usize] else {
+            return None;
+        };
+        let is_near = at.distance_squared(*middle) < *reach2;
+        is_near.then(|| Spherical::new(&geometries[glow.surface as usize], glow.domain, at))?
+    }
+
     /// What stands for the density per solid angle with which [`draw`](Self::draw) finds a point of an emitter's shining side
-    /// from a place, seen at `distance` with the cosine `cosine` to its normal.
+    /// from the point `at`, seen at `distance` with the cosine `cosine` to its normal.
     #[must_use]
-    pub fn density(&self, entry: u32, distance: f32, cosine: f32, draws: Draws<'_>) -> f32 {
+    pub fn density(
+        &self,
+        geometries: &[Geometry],
+        entry: u32,
+        at: Vec3,
+        [distance, cosine]: [f32; 2],
+        draws: Draws<'_>,
+    ) -> f32 {
         let presence = self.presence(self.chance(entry, draws));
         match &self.entries[entry as usize].source {
-            Source::Surface(glow) => presence * distance * distance / (glow.area * cosine),
+            Source::Surface(glow) => self.spherical(geometries, entry, at).map_or_else(
+                || presence * distance * distance / (glow.area * cosine),
+                |spherical| presence / spherical.solid_angle(),
+            ),
             Source::Sphere { radius, .. } => {
                 let distance2 = distance * distance + radius * (radius + 2.0 * distance * cosine);
                 cap(distance2, *radius).map_or(0.0, |narrowness| presence / (TAU * narrowness))
@@ -382,6 +426,18 @@ impl Emitters {
             Source::Light { .. } => 0.0,
         }
     }
+}
+
+/// How far from the middle of what is a polygon it may fill much of what is seen; 0 for the others.
+fn reach(geometries: &[Geometry], source: &Source) -> f32 {
+    let Source::Surface(glow) = source else { return 0.0 };
+    let geometry = &geometries[glow.surface as usize];
+    if !geometry.is_polygon() {
+        return 0.0;
+    }
+    let middle = geometry.point(geometry.middle(glow.domain));
+    let corners = geometry.corners(glow.domain).into_iter().map(|uv| geometry.point(uv).distance(middle));
+    NEAR * corners.fold(0.0, f32::max)
 }
 
 /// 1 − cosine of half the angle that a sphere fills, seen from outside of it.

@@ -149,6 +149,30 @@ fn irradiance_is_right_in_half_shadow() {
     }
 }
 
+/// Of a lamp that is much nearer than it is large the nearest points send almost everything.
+#[test]
+fn irradiance_has_little_noise_beside_a_large_lamp() {
+    let materials = vec![
+        material(lambert(0.6), 0.0, true),
+        material(Lambert::BLACK, 10.0, true),
+        material(Lambert::BLACK, 0.0, true),
+    ];
+    // A wall beside the ground's middle, half hidden by another one.
+    let wall = |away: f64, from: f64, to: f64, material| {
+        let p = |y: f64, z: f64| dvec3(-away, y, z);
+        Surface::new(Shape::Quad([p(-1.0, from), p(1.0, from), p(1.0, to), p(-1.0, to)]), material)
+    };
+    let ground = square(1.0, 0.0, false, 0);
+    let lit = scene(vec![ground, wall(0.04, 0.001, 1.0, 1), wall(0.02, 0.02, 1.0, 2)], materials);
+    // What is known of all of the ground is wrong here.
+    for (is_known, most) in [(false, 0.5), (true, 2.0)] {
+        let found = draws(&lit, 1024, 3, is_known);
+        let mean = found.iter().sum::<f64>() / found.len() as f64;
+        let deviation = (found.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / found.len() as f64).sqrt();
+        assert!(deviation < most * mean, "known {is_known}: {mean} ± {deviation}");
+    }
+}
+
 #[test]
 fn both_ways_to_find_light_agree_for_gloss() {
     // The expected value by brute force over the lamp, with the reflector's own eval; it is what no sampling of the
