@@ -8,13 +8,15 @@ use crate::basis::{Basis, Beyond, Known, Peak, Superposition, Support};
 use crate::haar::{Haar, Refinement};
 use crate::outgoing::{Focus, Outgoing, SHOWN_COSINE};
 use crate::reflector::{Incident, Reflector, Ward};
-use crate::samples::{IlluminationSample, Place, SampleSet, arriving_as, merge_close, merge_weak};
+use crate::samples::{
+    IlluminationSample, LEAST_COSINE, Place, SampleSet, arriving_as, look_again, merge_close, merge_weak,
+};
 use albedos::Albedos;
 use glam::Vec3;
 use hr_diffuse::hooks::TYPICAL_LOBE;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
 use std::cell::Cell;
-use std::f32::consts::FRAC_PI_2;
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -45,6 +47,8 @@ const AROUND: f32 = 0.3;
 const WEAK_PER_ERROR: f32 = 3.0;
 /// … and never more than this share.
 const WEAK_SHARE: f32 = 0.3;
+/// Those stay as they are that make lobes that are at least so many times the error asked for as bright as all other light.
+const BRIGHT: f32 = 2.0;
 /// Of a leaf's samples, the directions of so many strongest ones are told to the projection as peaks.
 const PEAKS: usize = 12;
 /// Peaks are found with others that are no more than so many times as wide.
@@ -232,16 +236,24 @@ impl<B: Basis> GlossyField<B> {
         // A lobe that is not round is narrower one way; a mirror shows everything.
         let is_wide = material.mirror.is_none() && material.reflector.grain().is_none();
         let close = if is_wide { width.max(narrowest) } else { narrowest };
+        let flat = hierarchy.is_flat(leaf);
+        // What goes on to other leaves is spread by how far away they are; only who looks at a highlight sees its edge.
+        let error = if arrived.shown { arrived.error } else { 1.0 };
         let arrive = |normal: Vec3, irradiance: Option<Rgb>| {
             let place = Place::along(center, normal, material.reflector.grain());
-            let mut incident = Vec::new();
-            arriving_as(hierarchy, (leaf, path), &place, true, &mut incident);
+            let (mut incident, mut origins) = (Vec::new(), Vec::new());
+            arriving_as(hierarchy, (leaf, path), &place, true, &mut incident, |origin| origins.push(origin));
             if let Some(irradiance) = irradiance {
                 balance(&mut incident, irradiance);
             }
+            let peak = |sample: &Incident| material.peak(sample) / material.mean(&arrived);
+            if arrived.shown && flat {
+                look_again(hierarchy, leaf, &origins, (peak, arrived.error), &mut incident);
+            }
             merge_close(&mut incident, close);
-            let focus = Focus::of(&incident, &place.frame);
-            merge_weak(&mut incident, width.max(narrowest), WEAK_SHARE.min(WEAK_PER_ERROR * arrived.error));
+            let focus = Focus::of(&incident, &place.frame, hierarchy.radius(leaf));
+            let share = WEAK_SHARE.min(WEAK_PER_ERROR * arrived.error);
+            merge_weak(&mut incident, width.max(narrowest), share, |sample| peak(sample) >= BRIGHT * error);
             // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
             for sample in &mut incident {
                 sample.widen(if width < WIDE * narrowest { narrowest } else { 0.0 });
@@ -251,7 +263,6 @@ impl<B: Basis> GlossyField<B> {
             }
             (place, incident, focus)
         };
-        let flat = hierarchy.is_flat(leaf);
         let around = arrived.shown && !flat && normals.angle() > AROUND;
         let (place, mut incident, focus) = arrive(normals.axis, (!around).then_some(arrived.irradiance));
         if around {
@@ -263,8 +274,6 @@ impl<B: Basis> GlossyField<B> {
         }
         // A glossy part may be negative where the diffuse one overestimates; both together are not.
         let (least, negligible) = (-arrived.diffuse, arrived.negligible);
-        // What goes on to other leaves is spread by how far away they are; only who looks at a highlight sees its edge.
-        let error = if arrived.shown { arrived.error } else { 1.0 };
         Some(Reflection { material, place, incident, focus, width, narrowest, flat, around, least, negligible, error })
     }
 
@@ -312,6 +321,17 @@ impl Material {
             light += mirror.reflect_sum(incident, outgoing);
         }
         light
+    }
+
+    /// About the radiance of a sample's lobe at its brightest, sum of channels.
+    fn peak(&self, sample: &Incident) -> f32 {
+        let across = (self.albedo * sample.irradiance).element_sum() * FRAC_1_PI;
+        across / (sample.direction.z.max(LEAST_COSINE) * (sample.extent * sample.extent + self.width * self.width))
+    }
+
+    /// Mean radiance of a leaf, sum of channels.
+    fn mean(&self, arrived: &Arrived) -> f32 {
+        (arrived.diffuse + self.albedo * arrived.irradiance * FRAC_1_PI).element_sum().max(f32::MIN_POSITIVE)
     }
 
     /// Radiosity beside the diffuse one that samples make, whatever direction it leaves in.

@@ -29,17 +29,19 @@ const MOST: f32 = 1e30;
 pub struct Focus([u16; 3]);
 
 impl Focus {
-    /// The plane that fits samples best, where each counts by the square of its irradiance: what is spread over many directions
-    /// has no edges that could be seen to move. Directions of samples are those of a frame whose columns are given.
+    /// The plane that fits the samples of a leaf with a radius best, where each counts by the square of its irradiance: what is spread over
+    /// many directions has no edges that could be seen to move. Directions of samples are those of a frame whose columns are given.
+    /// What is nearer than the leaf is large is taken to be as far away as that: its ends see different things there.
     #[must_use]
-    pub fn of(incident: &[Incident], frame: &Mat3) -> Self {
+    pub fn of(incident: &[Incident], frame: &Mat3, radius: f32) -> Self {
+        let nearest = radius.max(f32::MIN_POSITIVE).recip();
         let (mut matrix, mut right, mut sum) = (DMat3::ZERO, DVec3::ZERO, 0.0);
         for sample in incident {
             let direction = (*frame * sample.direction).as_dvec3();
             let weight = f64::from(sample.irradiance.element_sum()).powi(2);
             matrix +=
                 DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z) * weight;
-            right += direction * (weight * f64::from(sample.nearness));
+            right += direction * (weight * f64::from(sample.nearness.min(nearest)));
             sum += weight;
         }
         if sum <= 0.0 {
@@ -118,7 +120,7 @@ mod tests {
 
     /// How far off (radians) the middle's direction toward lamps is found from places of the leaf.
     fn worst(places: &[Vec3]) -> f32 {
-        let focus = Focus::of(&lamps(places), &Mat3::IDENTITY);
+        let focus = Focus::of(&lamps(places), &Mat3::IDENTITY, 0.5);
         let mut worst = 0.0_f32;
         for place in places {
             for k in 0..20 {
@@ -150,7 +152,9 @@ mod tests {
         let direction = Vec3::new(0.6, 0.0, 0.8);
         let offset = Vec3::new(0.3, 0.1, 0.0);
         let sky = [Incident { direction, irradiance: Rgb::ONE, ..Incident::default() }];
-        for focus in [Focus::of(&sky, &Mat3::IDENTITY), Focus::of(&[], &Mat3::IDENTITY), Focus::new(Vec3::NAN)] {
+        for focus in
+            [Focus::of(&sky, &Mat3::IDENTITY, 0.5), Focus::of(&[], &Mat3::IDENTITY, 0.5), Focus::new(Vec3::NAN)]
+        {
             assert!(
                 focus.from_middle(offset, direction).normalize().distance(direction) < 1e-6,
                 "{focus:?} is infinitely far"
@@ -160,6 +164,18 @@ mod tests {
         for plane in [offset * 1e3, -offset * 1e3] {
             let found = Focus::new(plane).from_middle(offset, direction);
             assert!(found.is_finite() && found.length() >= 0.9 * NEAREST, "{plane} makes {found} of a direction");
+        }
+    }
+
+    /// The end of a board along a wall sees the wall next to it, the middle what is next to the middle: along the board it sees neither.
+    #[test]
+    fn what_touches_a_leaf_does_not_turn_the_view() {
+        let touching = lamps(&[Vec3::new(0.0, 0.01, 0.002), Vec3::new(0.3, -1.0, 1.5)]);
+        let focus = Focus::of(&touching, &Mat3::IDENTITY, 0.5);
+        let direction = Vec3::new(0.0, 0.94, 0.34).normalize();
+        for k in [-0.5, 0.5] {
+            let off = focus.from_middle(Vec3::X * k, direction).angle_between(direction);
+            assert!(off < 1.0, "turned by {off}");
         }
     }
 

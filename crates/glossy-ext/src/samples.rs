@@ -106,16 +106,17 @@ pub fn arriving<H: Hierarchy>(
     place: &Place,
     out: &mut Vec<Incident>,
 ) {
-    arriving_as(hierarchy, (leaf, path), place, false, out);
+    arriving_as(hierarchy, (leaf, path), place, false, out, |_| ());
 }
 
-/// The same, [wide](crate::wide) senders in parts if these count.
+/// The same, [wide](crate::wide) senders in parts if these count; `origin` is told where what arrives is from.
 pub(crate) fn arriving_as<H: Hierarchy>(
     hierarchy: &H,
     (leaf, path): (NodeId, &[&SampleSet]),
     place: &Place,
     in_parts: bool,
     out: &mut Vec<Incident>,
+    mut origin: impl FnMut(Origin),
 ) {
     out.clear();
     let mut receiver = leaf;
@@ -124,6 +125,7 @@ pub(crate) fn arriving_as<H: Hierarchy>(
             let from = Place::new(hierarchy.center(receiver), hierarchy.normals(receiver).axis);
             for sample in *samples {
                 arrive(hierarchy, (sample, &from), place, in_parts, out);
+                origin(Origin { receiver, sender: sample.sender(), end: out.len() });
             }
         }
         match hierarchy.parent(receiver) {
@@ -133,13 +135,63 @@ pub(crate) fn arriving_as<H: Hierarchy>(
     }
 }
 
-/// Weak samples that make a peak of at least this share of the highest one stay as they are: of the lamps along a counter one sees
-/// the far ones, too. That takes 8 % more BRDF evaluations in a soda shop.
-const PEAK_SHARE: f32 = 0.25;
+/// Where samples that arrive are from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Origin {
+    /// Node that received it.
+    receiver: NodeId,
+    sender: NodeId,
+    /// The first one that is of another origin: a wide sender arrives in parts.
+    end: usize,
+}
+
+/// Samples are looked for whose lobes would be as bright as this share of a leaf's light, times the error asked for, …
+const LOOKED_FOR: f32 = 0.4;
+/// … were all of their senders seen, or where less is seen than this share of them, …
+const LEAST_SEEN: f32 = 0.05;
+/// … by so many rays for one that is as bright as all other light, …
+const LOOKS: f32 = 16.0;
+/// … but at least and at most so many.
+const LEAST_LOOKS: u32 = 3;
+const MOST_LOOKS: u32 = 16;
+
+/// Looks from a leaf for the senders whose lobes are bright there, where it is only known how much something larger sees of them.
+/// `peak` is how bright a sample's lobe is beside the leaf's mean light, `error` the relative error asked for.
+pub(crate) fn look_again<H: Hierarchy>(
+    hierarchy: &H,
+    leaf: NodeId,
+    origins: &[Origin],
+    (peak, error): (impl Fn(&Incident) -> f32, f32),
+    incident: &mut [Incident],
+) {
+    let (mut first, least) = (0, LOOKED_FOR * error);
+    for &Origin { receiver, sender, end } in origins {
+        let own = &mut incident[std::mem::replace(&mut first, end)..end];
+        let brightest = own.iter().map(&peak).fold(0.0, f32::max);
+        if receiver == leaf || brightest < LEAST_SEEN * least {
+            continue;
+        }
+        // Were only those looked for that are bright, they would be the ones that are too bright, and light would get lost.
+        let Some(seen) = hierarchy.seen(receiver, sender) else { continue };
+        let unoccluded = brightest / seen.max(LEAST_SEEN);
+        if unoccluded < least {
+            continue;
+        }
+        let looks = ((unoccluded * LOOKS) as u32).clamp(LEAST_LOOKS, MOST_LOOKS);
+        let Some(found) = hierarchy.look(leaf, sender, looks) else { continue };
+        let before: Rgb = own.iter().map(|sample| sample.irradiance).sum();
+        for sample in own {
+            sample.irradiance = Rgb::select(before.cmpgt(Rgb::ZERO), sample.irradiance * found / before, Rgb::ZERO);
+        }
+    }
+}
+
 /// Lobes grow brighter toward the horizon, but no further than this cosine.
-const LEAST_COSINE: f32 = 0.1;
+pub(crate) const LEAST_COSINE: f32 = 0.1;
 /// Cells along each side of the square that the hemisphere of directions is mapped to, for weak samples: 25° wide.
 const WEAK_CELLS: f32 = 6.0;
+/// So many times as many cells along a side there are for weak samples that the next wider cells are for.
+const WEAK_STEP: f32 = 0.25;
 /// Cells for close samples are at most this part of the lobe's width. What is merged then lies within a ninth of the width
 /// from its mean (standard deviation, per axis), and widens the lobe by less than a hundredth.
 const CLOSE: f32 = 0.25;
@@ -160,9 +212,9 @@ pub fn merge_close(incident: &mut Vec<Incident>, width: f32) {
 }
 
 /// Merges the weakest samples at a place, which make up such a share of the irradiance, so that no more than 36 of them are left. The
-/// strong ones stay as they are, and so do
-/// weak ones that make peaks of what a lobe of this width (radians) reflects: small lamps, far away.
-pub fn merge_weak(incident: &mut Vec<Incident>, width: f32, share: f32) {
+/// strong ones stay as they are, and so do weak ones whose lobes, of this width (radians), are `bright`: small lamps, far away; and the
+/// sums of weak ones within a lobe's width, or within a few, that are: of a lamp's shade each part may be dim.
+pub fn merge_weak(incident: &mut Vec<Incident>, width: f32, share: f32, bright: impl Fn(&Incident) -> bool) {
     if incident.len() <= (WEAK_CELLS * WEAK_CELLS) as usize {
         return;
     }
@@ -174,13 +226,19 @@ pub fn merge_weak(incident: &mut Vec<Incident>, width: f32, share: f32) {
         strong -= 1;
         rest += strength(&incident[strong]);
     }
-    // The lobe that a sample makes, at its brightest: irradiance across the direction, over all that it is spread over.
-    let peak = |sample: &Incident| {
-        strength(sample) / (sample.direction.z.max(LEAST_COSINE) * (sample.extent * sample.extent + width * width))
-    };
-    let least = PEAK_SHARE * incident.iter().map(peak).fold(0.0, f32::max);
-    incident[strong..].sort_by_key(|sample| peak(sample) < least);
-    strong += incident[strong..].iter().take_while(|sample| peak(sample) >= least).count();
+    let mut cells = 4.0 / width;
+    loop {
+        let dim = incident.split_off(strong);
+        let (mut stay, dim): (Vec<_>, Vec<_>) = dim.into_iter().partition(&bright);
+        incident.append(&mut stay);
+        strong = incident.len();
+        incident.extend(dim);
+        if cells <= WEAK_CELLS {
+            break;
+        }
+        merge(incident, strong, cells);
+        cells *= WEAK_STEP;
+    }
     merge(incident, strong, WEAK_CELLS);
 }
 
@@ -192,7 +250,7 @@ fn merge(incident: &mut Vec<Incident>, from: usize, cells: f32) {
         let cell = (square * cells).clamp(Vec2::ZERO, Vec2::splat(cells)).floor();
         (cell.y as u32, cell.x as u32)
     };
-    incident[from..].sort_by_key(cell);
+    incident[from..].sort_by_cached_key(cell);
     let mut kept = from;
     let mut next = from;
     while next < incident.len() {
@@ -389,10 +447,82 @@ mod tests {
         let mut incident: Vec<Incident> = [overhead, far].into_iter().chain((0..60).map(wall)).collect();
         let irradiance = |of: &[Incident]| of.iter().map(strength).sum::<f32>();
         let before = irradiance(&incident);
-        merge_weak(&mut incident, 0.1, 0.3);
+        merge_weak(&mut incident, 0.1, 0.3, |sample| strength(sample) > 20.0 * sample.extent * sample.extent);
         assert!(incident.contains(&overhead) && incident.contains(&far), "both lamps stay: {incident:?}");
         assert!(incident.len() <= 2 + 36, "walls are merged: {} samples", incident.len());
         assert!((irradiance(&incident) / before - 1.0).abs() < 1e-5, "irradiance adds up");
+    }
+
+    /// The inside of a lamp's shade is as bright as a bulb, though none of its many parts is; the parts of a wall stay dim together.
+    #[test]
+    fn dim_parts_of_something_bright_stay_together() {
+        let sample = |direction: Vec3, irradiance: f32| Incident {
+            direction: direction.normalize(),
+            irradiance: Rgb::splat(irradiance),
+            ..Incident::default()
+        };
+        let width = 0.08;
+        let bright = |sample: &Incident| strength(sample) > 60.0 * (sample.extent * sample.extent + width * width);
+        let overhead = sample(Vec3::new(0.2, 0.0, 1.0), 100.0);
+        // Half of the lobe's width across.
+        let shade = |k: u8| sample(Vec3::new(0.7 + 0.01 * f32::from(k % 5), 0.4 + 0.01 * f32::from(k / 5), 0.5), 0.05);
+        let wall = |k: u8| sample(Vec2::from_angle(0.1 * f32::from(k)).extend(0.1 + 0.02 * f32::from(k % 7)), 0.05);
+        let parts: Vec<Incident> = (0..25).map(shade).collect();
+        assert!(!parts.iter().any(bright), "none of them is bright by itself");
+        let mut incident: Vec<Incident> = std::iter::once(overhead).chain(parts).chain((0..60).map(wall)).collect();
+        merge_weak(&mut incident, width, 0.3, bright);
+        let is_shade = |i: &&Incident| i.direction.distance(shade(12).direction) < 0.05 && i.extent < width;
+        let found: f32 = incident.iter().filter(is_shade).map(strength).sum();
+        assert!((found / (25.0 * 0.15) - 1.0).abs() < 1e-3, "all of the shade, and where it is: {found}");
+        assert!(incident.len() <= 1 + 4 + 36, "walls are merged: {} samples", incident.len());
+    }
+
+    /// Knows what is really seen.
+    struct Seen(Rgb);
+
+    impl Hierarchy for Seen {
+        fn parent(&self, _: NodeId) -> Option<NodeId> {
+            None
+        }
+        fn center(&self, _: NodeId) -> Vec3 {
+            Vec3::ZERO
+        }
+        fn radius(&self, _: NodeId) -> f32 {
+            1.0
+        }
+        fn normals(&self, _: NodeId) -> hr_diffuse::Cone {
+            hr_diffuse::Cone::SPHERE
+        }
+        fn material(&self, _: NodeId) -> Option<u32> {
+            None
+        }
+        fn seen(&self, _: NodeId, sender: NodeId) -> Option<f32> {
+            (sender != NodeId(9)).then_some(0.25)
+        }
+        fn look(&self, _: NodeId, _: NodeId, rays: u32) -> Option<Rgb> {
+            assert!((LEAST_LOOKS..=MOST_LOOKS).contains(&rays), "{rays} rays");
+            Some(self.0)
+        }
+    }
+
+    #[test]
+    fn bright_senders_are_looked_for() {
+        let [leaf, above] = [NodeId(7), NodeId(3)];
+        let sample = |irradiance: f32| Incident { irradiance: Rgb::splat(irradiance), ..Incident::default() };
+        // Of a leaf's own, of one that is proved to be seen, of a dim one, of one in two parts, and of one that is dim as little is seen.
+        let all = [4.0, 4.0, 0.01, 1.0, 3.0, 0.2].map(sample);
+        let origin = |receiver, sender, end| Origin { receiver, sender: NodeId(sender), end };
+        let origins =
+            [origin(leaf, 1, 1), origin(above, 9, 2), origin(above, 1, 3), origin(above, 2, 5), origin(above, 4, 6)];
+        let found = |seen: Rgb| {
+            let mut incident = all;
+            let peak = |sample: &Incident| sample.irradiance.x;
+            look_again(&Seen(seen), leaf, &origins, (peak, 1.0), &mut incident);
+            incident.map(|sample| sample.irradiance)
+        };
+        let expected = [4.0, 4.0, 0.01, 2.0, 6.0, 8.0].map(Rgb::splat);
+        assert_eq!(found(Rgb::splat(8.0)), expected, "parts in proportion");
+        assert_eq!(found(Rgb::ZERO)[3..], [Rgb::ZERO; 3], "what is hidden is dark");
     }
 
     #[test]

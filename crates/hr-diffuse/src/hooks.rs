@@ -99,6 +99,16 @@ pub trait Hierarchy: Sync {
     fn is_distant(&self, _sender: NodeId) -> bool {
         false
     }
+    /// The share of a sender that a link's receiver sees, 0…1; `None` where it is the same all over the receiver, as nothing lies between
+    /// the two, or where nobody knows.
+    fn seen(&self, _receiver: NodeId, _sender: NodeId) -> Option<f32> {
+        None
+    }
+    /// Irradiance (W/m²) that a sender makes on a flat leaf with as much as the leaf sees of it, by so many rays from all over it; `None`
+    /// where nobody looks.
+    fn look(&self, _leaf: NodeId, _sender: NodeId, _rays: u32) -> Option<Rgb> {
+        None
+    }
     /// Whether the node is a part of one plane, so that all of it is oriented alike.
     fn is_flat(&self, node: NodeId) -> bool {
         self.material(node).is_some() && self.normals(node).cos_angle > FLAT_COSINE

@@ -15,6 +15,7 @@ pub mod beams;
 pub mod budget;
 mod calibrate;
 mod clock;
+mod closely;
 mod columns;
 pub mod cone;
 mod contacts;

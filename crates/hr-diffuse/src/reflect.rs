@@ -4,6 +4,7 @@
 //! averages over all directions.
 
 use crate::clock::Instant;
+use crate::closely::Closely;
 use crate::columns::gains;
 use crate::face_clusters::FaceClusters;
 use crate::hierarchy::Elements;
@@ -427,7 +428,7 @@ impl<L: LightField> Solver<L> {
             })
             .collect();
         self.stats.skipped.converged_leaves += (leaves.len() - changed.len()) as u64;
-        let exitant = self.exitant_of(&changed, new, false, watch);
+        let (exitant, _) = self.exitant_of(&changed, new, false, watch);
         changed.truncate(exitant.len());
         for (Standing { leaf, negligible, .. }, exitant) in changed.iter().zip(exitant) {
             self.reflected[*leaf as usize] = exitant;
@@ -436,15 +437,15 @@ impl<L: LightField> Solver<L> {
         changed.into_iter().map(|standing| standing.leaf).collect()
     }
 
-    /// What the extension makes of the incident light of leaves, in order, until `watch` breaks.
+    /// What the extension makes of the incident light of leaves, in order, until `watch` breaks; and the rays that it took.
     fn exitant_of(
         &self,
         leaves: &[Standing],
         new: Option<&[Rgb]>,
         shown: bool,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Vec<L::Exitant> {
-        let (elements, light) = (&self.elements, self.light());
+    ) -> (Vec<L::Exitant>, u64) {
+        let (elements, closely) = (&self.elements, Closely::new(self.light(), &self.links));
         let reflect = |&Standing { leaf, spread, negligible, error }: &Standing| {
             let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
             let mut node = leaf;
@@ -459,7 +460,7 @@ impl<L: LightField> Solver<L> {
             let arrived = Arrived { irradiance, diffuse, spread, negligible, error, shown };
             // Outlines of senders show where leaves are looked at; what goes on to other elements is spread by how far away they are.
             if shown {
-                self.field.reflect(&light, NodeId(leaf), &path, arrived)
+                self.field.reflect(&closely, NodeId(leaf), &path, arrived)
             } else {
                 self.field.reflect(elements, NodeId(leaf), &path, arrived)
             }
@@ -471,7 +472,7 @@ impl<L: LightField> Solver<L> {
             }
             exitant.par_extend(part.par_iter().map(reflect));
         }
-        exitant
+        (exitant, closely.rays())
     }
 
     /// Reflects the incident light of all leaves once more, of those too whose light no link asked for or was carried as
@@ -540,7 +541,7 @@ impl<L: LightField> Solver<L> {
         let progress = self.progress(Phase::Transport, 0.9);
         let (mut done, mut stopped) = (0, false);
         let chunk = BETWEEN_WATCHES * threads::current_num_threads();
-        let exitant = self.exitant_of(&leaves, None, true, &mut || {
+        let (exitant, rays) = self.exitant_of(&leaves, None, true, &mut || {
             let share = (done as f32 / leaves.len() as f32).min(1.0);
             done += chunk;
             let answer = watch(&Progress { fraction: progress.fraction + 0.04 * share, ..progress });
@@ -549,6 +550,7 @@ impl<L: LightField> Solver<L> {
         });
         self.shown.extend(leaves.into_iter().map(|standing| standing.leaf).zip(exitant));
         self.stats.stopped |= stopped;
+        self.stats.vertex_rays += rays;
         self.stats.seconds.reflect += start.elapsed().as_secs_f64();
     }
 

@@ -1,0 +1,134 @@
+//! Leaves that are looked at closely: what they see themselves, where links tell only what something larger sees.
+//!
+//! A link lies as high up as its light lets it. Of a lamp that sends a thousandth of a floor's light it is known how much all of the
+//! floor sees of it; but its highlight may be the brightest thing on a polished board, and is there or not.
+
+use crate::Rgb;
+use crate::cone::Cone;
+use crate::hooks::{Hierarchy, LightField, NodeId, Sides};
+use crate::links::Links;
+use crate::sampling::{hash, point2, unit};
+use crate::segments::{receiving_point, visibility_at};
+use crate::transport::Light;
+use glam::Vec3;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The hierarchy with its light and links, for an extension that reflects light to be looked at.
+pub(crate) struct Closely<'a, L: LightField> {
+    light: Light<'a, L>,
+    links: &'a Links,
+    rays: AtomicU64,
+}
+
+impl<'a, L: LightField> Closely<'a, L> {
+    pub(crate) fn new(light: Light<'a, L>, links: &'a Links) -> Self {
+        Self { light, links, rays: AtomicU64::new(0) }
+    }
+
+    /// Rays shot so far.
+    pub(crate) fn rays(&self) -> u64 {
+        self.rays.load(Ordering::Relaxed)
+    }
+}
+
+impl<L: LightField> Hierarchy for Closely<'_, L> {
+    fn parent(&self, node: NodeId) -> Option<NodeId> {
+        self.light.parent(node)
+    }
+    fn center(&self, node: NodeId) -> Vec3 {
+        self.light.center(node)
+    }
+    fn radius(&self, node: NodeId) -> f32 {
+        self.light.radius(node)
+    }
+    fn normals(&self, node: NodeId) -> Cone {
+        self.light.normals(node)
+    }
+    fn material(&self, node: NodeId) -> Option<u32> {
+        self.light.material(node)
+    }
+    fn direction_to(&self, sender: NodeId, at: Vec3) -> (Vec3, f32) {
+        self.light.elements.direction_to(sender, at)
+    }
+    fn is_distant(&self, sender: NodeId) -> bool {
+        self.light.is_distant(sender)
+    }
+    fn sides(&self, sender: NodeId) -> Option<Sides> {
+        self.light.sides(sender)
+    }
+    fn seen(&self, receiver: NodeId, sender: NodeId) -> Option<f32> {
+        let links = self.links.of(receiver.0);
+        let at = links.binary_search_by_key(&sender.0, |link| link.sender).ok()?;
+        Some(links[at].visibility).filter(|&visibility| visibility >= 0.0)
+    }
+    fn look(&self, leaf: NodeId, sender: NodeId, rays: u32) -> Option<Rgb> {
+        let element = self.light.element(leaf.0);
+        let (irradiance, _) = self.light.arriving_at(element.center, element.normals.axis, sender.0, 0.0);
+        if irradiance == Rgb::ZERO {
+            return Some(irradiance);
+        }
+        let seed = hash(leaf.0, 0x100c);
+        let middle = (element.center, element.normals.axis, element.source);
+        let spot =
+            |i: u32| receiving_point(self.light, leaf.0, (unit(hash(seed, i)), point2(seed, i))).unwrap_or(middle);
+        self.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
+        Some(irradiance * visibility_at(self.light, spot, sender.0, (rays, seed)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::links::Link;
+    use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::DVec3;
+
+    /// A floor in four parts below a small lamp, which a sheet hides from two of them; one link to all of it.
+    #[test]
+    fn leaves_see_what_the_floor_does_not_tell() {
+        let quad = |o: DVec3, a: DVec3, b: DVec3| Shape::Quad([o, o + a, o + a + b, o + b]);
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let shapes = [
+            quad(DVec3::ZERO, x, y),
+            quad(DVec3::new(0.2, 0.45, 0.9), y * 0.1, x * 0.1),
+            quad(DVec3::new(0.5, 0.0, 0.0), y, z),
+        ];
+        let material = |exitance| DiffuseMaterial {
+            reflectance: Rgb::splat(0.5),
+            exitance: Rgb::splat(exitance),
+            two_sided: true,
+        };
+        let input = SceneInput {
+            surfaces: shapes
+                .into_iter()
+                .zip([0, 1, 0])
+                .map(|(shape, material)| Surface::new(shape, material))
+                .collect(),
+            materials: vec![material(0.0), material(1.0)],
+            ..SceneInput::default()
+        };
+        let mut solver = Solver::new(&input, Settings::with_error(0.5), ()).expect("the scene is sound");
+        let [floor, lamp] = [0, 1].map(|surface| solver.elements.surface_nodes[surface][0]);
+        solver.elements.split(&solver.scene, floor);
+        let count = solver.elements.nodes.len();
+        solver.exitant.radiosity = vec![Rgb::ZERO; count];
+        solver.exitant.radiosity[lamp as usize] = Rgb::ONE;
+        solver.exitant.range = solver.exitant.radiosity.iter().map(|&radiosity| [radiosity; 2]).collect();
+        let link = |visibility| Link { receiver: floor, sender: lamp, factor: 0.003, visibility };
+        let links = [0.5, -1.0].map(|visibility| Links::new(vec![link(visibility)], count));
+        let [floor_id, lamp_id] = [floor, lamp].map(NodeId);
+        let closely = Closely::new(solver.light(), &links[0]);
+        assert_eq!(closely.seen(floor_id, lamp_id), Some(0.5), "as the link says");
+        assert_eq!(closely.seen(lamp_id, floor_id), None, "there is no link");
+        assert_eq!(Closely::new(solver.light(), &links[1]).seen(floor_id, lamp_id), None, "proved for all of it");
+        let element = solver.elements.nodes[floor as usize];
+        for leaf in element.first_child..element.first_child + element.child_count {
+            let at = solver.elements.nodes[leaf as usize];
+            let right = solver.light().irradiance_at(at.center, at.normals.axis, lamp);
+            let found = closely.look(NodeId(leaf), lamp_id, 256).expect("it looks");
+            let is_lit = solver.scene.normalization.to_scene(at.center).x < 0.5;
+            assert_eq!(found, if is_lit { right } else { Rgb::ZERO }, "all of it or nothing, at {}", at.center);
+        }
+        assert_eq!(closely.rays(), 4 * 256, "all are counted");
+    }
+}
