@@ -118,7 +118,7 @@ fn coarse_distributions_keep_their_power() {
         field.receive(&mut incident, &Transfer { sender, direction, irradiance: sample, oriented: true });
         irradiance += sample;
     }
-    let diffuse = irradiance * (0.4 * std::f32::consts::FRAC_1_PI);
+    let diffuse = irradiance * (0.4 * FRAC_1_PI);
     let arrived = Arrived { irradiance, diffuse, spread: 0.0, negligible: 0.1, error: 0.1, shown: false };
     let reflection = field.reflection(&floor, FLOOR, &[&incident], arrived).expect("it is lit");
     let mut exact = Rgb::ZERO;
