@@ -49,6 +49,8 @@ const WEAK_PER_ERROR: f32 = 3.0;
 const WEAK_SHARE: f32 = 0.3;
 /// Those stay as they are that make lobes that are at least so many times the error asked for as bright as all other light.
 const BRIGHT: f32 = 2.0;
+/// The same, so many times as bright, where all that is around is mirrored in what is round, each thing in a small part of it.
+const BRIGHT_AROUND: f32 = 8.0;
 /// Of a leaf's samples, the directions of so many strongest ones are told to the projection as peaks.
 const PEAKS: usize = 12;
 /// Peaks are found with others that are no more than so many times as wide.
@@ -239,6 +241,8 @@ impl<B: Basis> GlossyField<B> {
         let flat = hierarchy.is_flat(leaf);
         // What goes on to other leaves is spread by how far away they are; only who looks at a highlight sees its edge.
         let error = if arrived.shown { arrived.error } else { 1.0 };
+        let around = arrived.shown && !flat && normals.angle() > AROUND;
+        let bright = BRIGHT * error * if around { BRIGHT_AROUND } else { 1.0 };
         let arrive = |normal: Vec3, irradiance: Option<Rgb>| {
             let place = Place::along(center, normal, material.reflector.grain());
             let (mut incident, mut origins) = (Vec::new(), Vec::new());
@@ -246,14 +250,14 @@ impl<B: Basis> GlossyField<B> {
             if let Some(irradiance) = irradiance {
                 balance(&mut incident, irradiance);
             }
-            let peak = |sample: &Incident| material.peak(sample) / material.mean(&arrived);
+            let peak = |sample: &Incident| material.peak(sample, width.max(narrowest)) / material.mean(&arrived);
             if arrived.shown && flat {
                 look_again(hierarchy, leaf, &origins, (peak, arrived.error), &mut incident);
             }
             merge_close(&mut incident, close);
             let focus = Focus::of(&incident, &place.frame, hierarchy.radius(leaf));
             let share = WEAK_SHARE.min(WEAK_PER_ERROR * arrived.error);
-            merge_weak(&mut incident, width.max(narrowest), share, |sample| peak(sample) >= BRIGHT * error);
+            merge_weak(&mut incident, width.max(narrowest), share, |sample| peak(sample) >= bright);
             // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
             for sample in &mut incident {
                 sample.widen(if width < WIDE * narrowest { narrowest } else { 0.0 });
@@ -263,7 +267,6 @@ impl<B: Basis> GlossyField<B> {
             }
             (place, incident, focus)
         };
-        let around = arrived.shown && !flat && normals.angle() > AROUND;
         let (place, mut incident, focus) = arrive(normals.axis, (!around).then_some(arrived.irradiance));
         if around {
             let (below, lower, _) = arrive(-normals.axis, None);
@@ -323,10 +326,10 @@ impl Material {
         light
     }
 
-    /// About the radiance of a sample's lobe at its brightest, sum of channels.
-    fn peak(&self, sample: &Incident) -> f32 {
+    /// About the radiance of a sample's lobe of some width at its brightest, sum of channels.
+    fn peak(&self, sample: &Incident, width: f32) -> f32 {
         let across = (self.albedo * sample.irradiance).element_sum() * FRAC_1_PI;
-        across / (sample.direction.z.max(LEAST_COSINE) * (sample.extent * sample.extent + self.width * self.width))
+        across / (sample.direction.z.max(LEAST_COSINE) * (sample.extent * sample.extent + width * width))
     }
 
     /// Mean radiance of a leaf, sum of channels.
