@@ -226,7 +226,7 @@ pub fn merge_weak(incident: &mut Vec<Incident>, width: f32, share: f32, bright: 
         strong -= 1;
         rest += strength(&incident[strong]);
     }
-    let mut cells = 4.0 / width;
+    let mut cells = (4.0 / width).min(f32::from(u16::MAX));
     loop {
         let dim = incident.split_off(strong);
         let (mut stay, dim): (Vec<_>, Vec<_>) = dim.into_iter().partition(&bright);
@@ -530,6 +530,10 @@ mod tests {
         let mut all = light(16);
         merge_close(&mut all, 0.0);
         assert_eq!(all, light(16), "nothing is merged");
+        for width in [0.0, f32::NAN, -1.0] {
+            merge_weak(&mut all, width, 1.0, |_| true);
+            assert_eq!(all.len(), 256, "all of them are bright");
+        }
     }
 
     #[test]
