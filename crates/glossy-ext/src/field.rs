@@ -243,17 +243,17 @@ impl<B: Basis> GlossyField<B> {
         let error = if arrived.shown { arrived.error } else { 1.0 };
         let around = arrived.shown && !flat && normals.angle() > AROUND;
         let bright = BRIGHT * error * if around { BRIGHT_AROUND } else { 1.0 };
+        let (looks, mean) = (arrived.shown && flat, material.mean(&arrived));
+        let peak = |sample: &Incident| material.peak(sample, width.max(narrowest)) / mean;
         let arrive = |normal: Vec3, irradiance: Option<Rgb>| {
             let place = Place::along(center, normal, material.reflector.grain());
             let (mut incident, mut origins) = (Vec::new(), Vec::new());
-            arriving_as(hierarchy, (leaf, path), &place, true, &mut incident, |origin| origins.push(origin));
+            let keep = |origin| origins.extend(looks.then_some(origin));
+            arriving_as(hierarchy, (leaf, path), &place, true, &mut incident, keep);
             if let Some(irradiance) = irradiance {
                 balance(&mut incident, irradiance);
             }
-            let peak = |sample: &Incident| material.peak(sample, width.max(narrowest)) / material.mean(&arrived);
-            if arrived.shown && flat {
-                look_again(hierarchy, leaf, &origins, (peak, arrived.error), &mut incident);
-            }
+            look_again(hierarchy, leaf, &origins, (peak, error), &mut incident);
             merge_close(&mut incident, close);
             let focus = Focus::of(&incident, &place.frame, hierarchy.radius(leaf));
             let share = WEAK_SHARE.min(WEAK_PER_ERROR * arrived.error);

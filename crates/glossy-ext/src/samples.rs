@@ -469,11 +469,18 @@ mod tests {
         let wall = |k: u8| sample(Vec2::from_angle(0.1 * f32::from(k)).extend(0.1 + 0.02 * f32::from(k % 7)), 0.05);
         let parts: Vec<Incident> = (0..25).map(shade).collect();
         assert!(!parts.iter().any(bright), "none of them is bright by itself");
-        let mut incident: Vec<Incident> = std::iter::once(overhead).chain(parts).chain((0..60).map(wall)).collect();
+        // What is around it would blur it.
+        let around = |k: u8| {
+            let aside = Vec2::from_angle(0.3 * f32::from(k)) * 0.2;
+            sample(shade(12).direction + Vec3::new(aside.x, aside.y, 0.0), 0.05)
+        };
+        let walls = (0..60).map(wall).chain((0..20).map(around));
+        let mut incident: Vec<Incident> = std::iter::once(overhead).chain(parts).chain(walls).collect();
         merge_weak(&mut incident, width, 0.3, bright);
         let is_shade = |i: &&Incident| i.direction.distance(shade(12).direction) < 0.05 && i.extent < width;
         let found: f32 = incident.iter().filter(is_shade).map(strength).sum();
-        assert!((found / (25.0 * 0.15) - 1.0).abs() < 1e-3, "all of the shade, and where it is: {found}");
+        // A few parts may lie alone in a cell that the others do not reach into. Were all merged at once, none would be found there.
+        assert!(found > 0.9 * 25.0 * 0.15, "the shade, and where it is: {found}");
         assert!(incident.len() <= 1 + 4 + 36, "walls are merged: {} samples", incident.len());
     }
 

@@ -18,7 +18,7 @@ pub struct Stats {
     pub rays: u64,
     /// Rays shot to find out how much reflected light links should bring, and what the solution is off by.
     pub check_rays: u64,
-    /// Visibility rays shot for values at vertices.
+    /// Visibility rays shot for what is shown: values at vertices, and leaves that look for what makes highlights on them.
     pub vertex_rays: u64,
     /// Pairs of elements that the oracle looked at.
     pub pairs: u64,

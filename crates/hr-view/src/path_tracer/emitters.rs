@@ -175,7 +175,8 @@ impl Emitters {
             }
             let chance = power / total;
             sum += chance;
-            let near = (middle(&source), reach(geometries, &source).powi(2));
+            let middle = middle(&source);
+            let near = (middle, reach(geometries, &source, middle).powi(2));
             entries.push(Entry { source, chance, near });
             chances.push(sum);
         }
@@ -428,14 +429,13 @@ impl Emitters {
     }
 }
 
-/// How far from the middle of what is a polygon it may fill much of what is seen; 0 for the others.
-fn reach(geometries: &[Geometry], source: &Source) -> f32 {
+/// How far from its middle a polygon may fill much of what is seen; 0 for the others.
+fn reach(geometries: &[Geometry], source: &Source, middle: Vec3) -> f32 {
     let Source::Surface(glow) = source else { return 0.0 };
     let geometry = &geometries[glow.surface as usize];
     if !geometry.is_polygon() {
         return 0.0;
     }
-    let middle = geometry.point(geometry.middle(glow.domain));
     let corners = geometry.corners(glow.domain).into_iter().map(|uv| geometry.point(uv).distance(middle));
     NEAR * corners.fold(0.0, f32::max)
 }
