@@ -533,34 +533,51 @@ mod tests {
         assert!((agreed / right - 1.0).abs() < 0.3 * (1.0 - alone / right), "{agreed}, {alone} of {right}");
     }
 
-    /// A post beside a lamp is one element for what light it reflects, and dark behind.
-    #[test]
-    fn round_leaves_are_lit_on_the_side_of_the_lamp() {
-        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
-        let lamp = [-y - z, z - y, y + z, y - z].map(|corner| 3.0 * x + corner);
-        let post = Shape::Cone { ends: [-0.3 * z, 0.3 * z], radii: [0.1; 2] };
+    /// How far off (relative L1) the irradiance is once around a shape that is lit by a lamp, at a place along its profile; and how
+    /// many leaves it has.
+    fn off_around(shape: Shape, lamp: [DVec3; 4], along: f32) -> (f32, usize) {
         let material = |reflectance, exitance| DiffuseMaterial { reflectance, exitance, two_sided: false };
         let input = SceneInput {
-            surfaces: vec![Surface::new(post, 0), Surface::new(Shape::Quad(lamp), 1)],
+            surfaces: vec![Surface::new(shape, 0), Surface::new(Shape::Quad(lamp), 1)],
             materials: vec![material(Rgb::splat(0.5), Rgb::ZERO), material(Rgb::ZERO, Rgb::ONE)],
             ..SceneInput::default()
         };
         let mut solver = Solver::new(&input, Settings::with_error(0.5), ()).expect("two surfaces");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         let solution = solver.finish(&mut |_| ControlFlow::Continue(()));
-        let is_on_post = |leaf: &u32| solution.elements.nodes[*leaf as usize].source == 0;
-        let leaves: Vec<u32> = solution.elements.patch_leaves().filter(is_on_post).collect();
+        let is_lit = |leaf: &u32| solution.elements.nodes[*leaf as usize].source == 0;
+        let leaves = solution.elements.patch_leaves().filter(is_lit).count();
         let lamp = lamp.map(|corner| solution.scene.normalization.to_unit(corner));
         let (mut off, mut all) = (0.0, 0.0);
         for k in 0..64 {
-            let uv = Vec2::new((k as f32 + 0.5) / 64.0, 0.5);
-            let leaf = solution.elements.leaf_at(&solution.scene, 0, false, uv).expect("the post reflects");
+            let uv = Vec2::new((k as f32 + 0.5) / 64.0, along);
+            let leaf = solution.elements.leaf_at(&solution.scene, 0, false, uv).expect("it reflects");
             let (at, normal) = point_on(&solution.scene, &solution.elements, leaf.0, uv);
             let right = point_to_polygon(at, normal, &lamp);
             off += (solution.irradiance(leaf, uv).x - right).abs();
             all += right;
         }
-        assert!(leaves.len() <= 2 && off < 0.08 * all, "{} leaves: off by {off} of {all}", leaves.len());
+        (off / all, leaves)
+    }
+
+    /// A post beside a lamp is one element for what light it reflects, and dark behind.
+    #[test]
+    fn round_leaves_are_lit_on_the_side_of_the_lamp() {
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let lamp = [-y - z, z - y, y + z, y - z].map(|corner| 3.0 * x + corner);
+        let post = Shape::Cone { ends: [-0.3 * z, 0.3 * z], radii: [0.1; 2] };
+        let (off, leaves) = off_around(post, lamp, 0.5);
+        assert!(leaves <= 2 && off < 0.08, "{leaves} leaves: off by {off}");
+    }
+
+    /// So is a plate, whose corners are but its centre and one point of its rim.
+    #[test]
+    fn plates_are_lit_on_the_side_of_the_lamp() {
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let lamp = [-y - z, z - y, y + z, y - z].map(|corner| x - y + 0.5 * z + 0.5 * corner);
+        let plate = Shape::Ring { center: DVec3::ZERO, normal: z, inner: 0.0, outer: 0.3 };
+        let (off, leaves) = off_around(plate, lamp, 0.9);
+        assert!(leaves <= 2 && off < 0.08, "{leaves} leaves: off by {off}");
     }
 
     /// A wall sees mostly what is next to it of a floor, which is dark there and bright below a lamp farther on.

@@ -1,6 +1,6 @@
 //! Vertices for display: every leaf is shown as a fan about its middle, through its corners and through the corners that finer
 //! neighbours put on its edges, so that no crack opens where elements of different size meet. Where other surfaces stand on a
-//! leaf it is cut, and shown as several fans (`contacts.rs`); so is one that goes far around a curved surface.
+//! leaf it is cut, and shown as several fans (`contacts.rs`); so is one that goes far around a curved surface or a disk.
 
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::{Domain, Rgb};
@@ -14,6 +14,9 @@ pub(crate) const INSET: f32 = 0.02;
 /// Leaves whose normals differ from their middle's by more than this angle (radians) are shown in parts, as light changes with the
 /// normal, …
 const MOST_TURN: f32 = 0.6;
+/// … and so are those, flat or not, that go around their axis by more than this share of a full turn: of a disk, corners are but
+/// its centre and one point of its rim, …
+const MOST_AROUND: f32 = 0.25;
 /// … unless they are smaller than this share of all area: a part takes as long as a leaf.
 const SMALL: f32 = 3e-5;
 /// Most finer levels that a neighbour may have.
@@ -205,12 +208,14 @@ fn layout(scene: &SceneData, elements: &Elements, parts_of: impl Fn(u32) -> Smal
     Layout { vertices, parts }
 }
 
-/// Parts of a leaf whose normals differ little; the leaf itself, where it is flat, small or black.
+/// Parts of a leaf whose normals differ little and which do not go far around; the leaf itself, where it is such, small or black.
 fn turns(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Domain; 8]> {
     let element = &elements.nodes[leaf as usize];
     let geometry = &scene.surfaces()[element.source as usize];
     let is_whole = element.importance <= 0.0 || element.area < SMALL * elements.measure();
-    let turns = |domain: Domain| !is_whole && geometry.normal_cone(domain).angle() > MOST_TURN;
+    let turns = |domain: Domain| {
+        !is_whole && (geometry.normal_cone(domain).angle() > MOST_TURN || geometry.around(domain) > MOST_AROUND)
+    };
     let mut parts = SmallVec::<[Domain; 8]>::new();
     let mut open: SmallVec<[Domain; 8]> = smallvec![element.domain];
     while let Some(domain) = open.pop() {

@@ -298,6 +298,14 @@ impl Geometry {
         })
     }
 
+    /// Share of a full turn that a part of a surface of revolution goes around its axis; 0 for others.
+    pub(crate) fn around(&self, domain: Domain) -> f32 {
+        match self {
+            Self::Revolution(revolution) => revolution.turns(domain).0,
+            _ => 0.0,
+        }
+    }
+
     /// Whether the parameters are in a part; its border is.
     #[must_use]
     pub fn contains(&self, domain: Domain, uv: Vec2) -> bool {
