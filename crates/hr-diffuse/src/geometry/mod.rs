@@ -284,8 +284,8 @@ impl Geometry {
         }
     }
 
-    /// Halves of a part, cut along which way its normals turn most: around the axis or around the profile's centre. None where it
-    /// is flat.
+    /// Halves of a part, cut along which way it turns most: around the axis or around the profile's centre. None where it
+    /// is a polygon.
     pub(crate) fn turned_less(&self, domain: Domain) -> Option<[Domain; 2]> {
         let Self::Revolution(revolution) = self else { return None };
         let Domain { u0, v0, u1, v1 } = domain;
