@@ -60,6 +60,10 @@ pub trait Basis: Clone + Debug + Default + Send + Sync {
     /// Multiplies every value. A factor that is not finite, or that leaves nothing representable, empties.
     fn scale(&mut self, factor: f32);
 
+    /// Takes so much from every value, but not more than it is above zero: what functions that are smooth far from their peaks are
+    /// overestimated by where they are not [looked at closely](Known::negligible). Bases that do not adapt take no notice.
+    fn shrink(&mut self, _by: Rgb) {}
+
     /// The weighted sum Σ wᵢ hᵢ of distributions, such as those of the children of an element weighted by their share
     /// of its area (*pull*), no finer than the settings ask for. `offset` as in [`Known`]. Distributions with a weight
     /// that is zero or not finite are left out.

@@ -9,14 +9,15 @@ use crate::haar::{Haar, Refinement};
 use crate::outgoing::{Focus, Outgoing, SHOWN_COSINE};
 use crate::reflector::{Incident, Reflector, Ward};
 use crate::samples::{
-    IlluminationSample, LEAST_COSINE, Place, SampleSet, arriving_as, look_again, merge_close, merge_weak,
+    IlluminationSample, LEAST_COSINE, Place, SampleSet, arriving_as, brought, hidden, look_again, merge_close,
+    merge_weak,
 };
 use albedos::Albedos;
 use glam::Vec3;
 use hr_diffuse::hooks::TYPICAL_LOBE;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
 use std::cell::Cell;
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -55,6 +56,9 @@ const BRIGHT_AROUND: f32 = 8.0;
 const PEAKS: usize = 12;
 /// Peaks are found with others that are no more than so many times as wide.
 const AS_WIDE: f32 = 1.2;
+
+/// Distributions that have more power than this share beyond what they should are corrected where they are coarse before they are scaled.
+const UNNOTICED: f32 = 0.01;
 
 /// Reflectances and shares of radiances that are clamped by less are approximations, and not counted.
 const CLAMPED: f32 = 0.01;
@@ -247,13 +251,19 @@ impl<B: Basis> GlossyField<B> {
         let peak = |sample: &Incident| material.peak(sample, width.max(narrowest)) / mean;
         let arrive = |normal: Vec3, irradiance: Option<Rgb>| {
             let place = Place::along(center, normal, material.reflector.grain());
-            let (mut incident, mut origins) = (Vec::new(), Vec::new());
-            let keep = |origin| origins.extend(looks.then_some(origin));
-            arriving_as(hierarchy, (leaf, path), &place, true, &mut incident, keep);
+            let (mut incident, mut doubtful) = (Vec::new(), Vec::new());
+            arriving_as(hierarchy, (leaf, path), &place, true, &mut incident, |origin, samples| {
+                if irradiance.is_some() {
+                    doubtful.extend(brought(hierarchy, leaf, (&origin, samples), peak).filter(|_| looks));
+                }
+            });
             if let Some(irradiance) = irradiance {
                 balance(&mut incident, irradiance);
             }
-            look_again(hierarchy, leaf, &origins, (peak, error), &mut incident);
+            if looks {
+                hidden(hierarchy, (leaf, &place), (peak, error), &mut incident, &mut doubtful);
+            }
+            look_again(hierarchy, leaf, &doubtful, error, &mut incident);
             merge_close(&mut incident, close);
             let focus = Focus::of(&incident, &place.frame, hierarchy.radius(leaf));
             let share = WEAK_SHARE.min(WEAK_PER_ERROR * arrived.error);
@@ -466,9 +476,18 @@ impl Reflection<'_> {
         if self.around {
             return;
         }
-        let power = if self.flat { exitant.cosine_integral(self.place.normal()) } else { exitant.integral() };
-        let (power, mean) = (power.element_sum(), (self.material.albedo * irradiance).element_sum());
+        let power_of = |exitant: &B| {
+            if self.flat { exitant.cosine_integral(self.place.normal()) } else { exitant.integral() }
+        };
+        let (mut power, mean) = (power_of(exitant), (self.material.albedo * irradiance).element_sum());
         let made = self.material.reflected(&self.incident).element_sum().min(MOST_GAIN * mean);
+        let excess = power.element_sum() - made;
+        if excess > UNNOTICED * made && power.min_element() >= 0.0 {
+            let by = power * (excess / power.element_sum() / if self.flat { PI } else { 2.0 * PI });
+            exitant.shrink(by * (self.negligible / by.max_element()).min(1.0));
+            power = power_of(exitant);
+        }
+        let power = power.element_sum();
         // What is above zero here and below zero there may add up to next to nothing, of which no share is known.
         let scale = 1.0 + (made - power) / power.max(LEAST_POWER * mean);
         if power > 0.0 && scale > 0.0 {

@@ -451,6 +451,10 @@ impl Basis for Haar {
         self.scale(factor);
     }
 
+    fn shrink(&mut self, by: Rgb) {
+        *self = self.map(|_, value| value - value.clamp(Rgb::ZERO, by));
+    }
+
     fn average(distributions: &[(f32, &Self)], settings: &Refinement, offset: Rgb) -> Self {
         Self::average(distributions, settings, offset)
     }

@@ -106,7 +106,7 @@ pub fn arriving<H: Hierarchy>(
     place: &Place,
     out: &mut Vec<Incident>,
 ) {
-    arriving_as(hierarchy, (leaf, path), place, false, out, |_| ());
+    arriving_as(hierarchy, (leaf, path), place, false, out, |_, _| ());
 }
 
 /// The same, [wide](crate::wide) senders in parts if these count; `origin` is told where what arrives is from.
@@ -116,7 +116,7 @@ pub(crate) fn arriving_as<H: Hierarchy>(
     place: &Place,
     in_parts: bool,
     out: &mut Vec<Incident>,
-    mut origin: impl FnMut(Origin),
+    mut origin: impl FnMut(Origin, &mut [Incident]),
 ) {
     out.clear();
     let mut receiver = leaf;
@@ -124,8 +124,9 @@ pub(crate) fn arriving_as<H: Hierarchy>(
         if !samples.is_empty() {
             let from = Place::new(hierarchy.center(receiver), hierarchy.normals(receiver).axis);
             for sample in *samples {
+                let first = out.len();
                 arrive(hierarchy, (sample, &from), place, in_parts, out);
-                origin(Origin { receiver, sender: sample.sender(), end: out.len() });
+                origin(Origin { receiver, sample: *sample, end: out.len() }, &mut out[first..]);
             }
         }
         match hierarchy.parent(receiver) {
@@ -140,48 +141,123 @@ pub(crate) fn arriving_as<H: Hierarchy>(
 pub(crate) struct Origin {
     /// Node that received it.
     receiver: NodeId,
-    sender: NodeId,
+    sample: IlluminationSample,
     /// The first one that is of another origin: a wide sender arrives in parts.
     end: usize,
 }
 
-/// Samples are looked for whose lobes would be as bright as this share of a leaf's light, times the error asked for, …
+/// A sender of which it is not proved how much a leaf sees.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Doubtful {
+    sender: NodeId,
+    /// Its samples, from one on up to another.
+    first: usize,
+    end: usize,
+    /// How bright their lobes would be if all of it were seen.
+    unoccluded: f32,
+    /// Rays that what is known rests on.
+    rays: f32,
+}
+
+/// Samples are looked for whose lobes would be as bright as this share of a leaf's light, times the error asked for, were all of their
+/// senders seen, …
 const LOOKED_FOR: f32 = 0.4;
-/// … were all of their senders seen, or where less is seen than this share of them, …
-const LEAST_SEEN: f32 = 0.05;
 /// … by so many rays for one that is as bright as all other light, …
 const LOOKS: f32 = 16.0;
 /// … but at least and at most so many.
 const LEAST_LOOKS: u32 = 3;
 const MOST_LOOKS: u32 = 16;
+/// Of what is let through there is this share at least.
+const LEAST_SEEN: f32 = 0.01;
+/// What leaves found out themselves rests on so many rays.
+const KNOWN: f32 = 4.0;
+/// What is not seen at all is kept as this share, in proportion.
+const NEXT_TO_NOTHING: f32 = 1e-6;
 
-/// Looks from a leaf for the senders whose lobes are bright there, where it is only known how much something larger sees of them.
-/// `peak` is how bright a sample's lobe is beside the leaf's mean light, `error` the relative error asked for.
+/// Sum of the irradiances of samples.
+fn sum(samples: &[Incident]) -> Rgb {
+    samples.iter().map(|sample| sample.irradiance).sum()
+}
+
+/// Scales samples so that together they are an irradiance.
+fn scale(samples: &mut [Incident], now: Rgb) {
+    let before = sum(samples);
+    for sample in samples {
+        sample.irradiance = Rgb::select(before.cmpgt(Rgb::ZERO), sample.irradiance * now / before, Rgb::ZERO);
+    }
+}
+
+/// Samples of one origin as the leaf has found out that they arrive, and whether that is worth a closer look.
+pub(crate) fn brought<H: Hierarchy>(
+    hierarchy: &H,
+    leaf: NodeId,
+    (origin, samples): (&Origin, &mut [Incident]),
+    peak: impl Fn(&Incident) -> f32,
+) -> Option<Doubtful> {
+    let Origin { receiver, sample, end } = *origin;
+    let sender = sample.sender();
+    let doubtful = hierarchy.seen(receiver, sender).map(|seen| {
+        let unoccluded = samples.iter().map(&peak).fold(0.0, f32::max) / seen.max(LEAST_SEEN);
+        Doubtful {
+            sender,
+            first: end - samples.len(),
+            end,
+            unoccluded,
+            rays: if receiver == leaf { KNOWN } else { 0.0 },
+        }
+    });
+    match hierarchy.brought(leaf, receiver, sender) {
+        Some(brought) => {
+            scale(samples, sample.irradiance() * brought.max(NEXT_TO_NOTHING));
+            doubtful.map(|doubtful| Doubtful { rays: KNOWN, ..doubtful })
+        }
+        None => doubtful,
+    }
+}
+
+/// Looks from a leaf for the senders whose lobes are bright there, where it is not proved how much the leaf sees of them. `peak` is how
+/// bright a sample's lobe is beside the leaf's mean light, `error` the relative error asked for.
 pub(crate) fn look_again<H: Hierarchy>(
     hierarchy: &H,
     leaf: NodeId,
-    origins: &[Origin],
-    (peak, error): (impl Fn(&Incident) -> f32, f32),
+    doubtful: &[Doubtful],
+    error: f32,
     incident: &mut [Incident],
 ) {
-    let (mut first, least) = (0, LOOKED_FOR * error);
-    for &Origin { receiver, sender, end } in origins {
-        let own = &mut incident[std::mem::replace(&mut first, end)..end];
-        let brightest = own.iter().map(&peak).fold(0.0, f32::max);
-        if receiver == leaf || brightest < LEAST_SEEN * least {
-            continue;
-        }
-        // Were only those looked for that are bright, they would be the ones that are too bright, and light would get lost.
-        let Some(seen) = hierarchy.seen(receiver, sender) else { continue };
-        let unoccluded = brightest / seen.max(LEAST_SEEN);
-        if unoccluded < least {
+    for &Doubtful { sender, first, end, unoccluded, rays } in doubtful {
+        if unoccluded < LOOKED_FOR * error {
             continue;
         }
         let looks = ((unoccluded * LOOKS) as u32).clamp(LEAST_LOOKS, MOST_LOOKS);
         let Some(found) = hierarchy.look(leaf, sender, looks) else { continue };
-        let before: Rgb = own.iter().map(|sample| sample.irradiance).sum();
-        for sample in own {
-            sample.irradiance = Rgb::select(before.cmpgt(Rgb::ZERO), sample.irradiance * found / before, Rgb::ZERO);
+        let known = rays / (rays + looks as f32);
+        let now = sum(&incident[first..end]) * known + found * (1.0 - known);
+        scale(&mut incident[first..end], now);
+    }
+}
+
+/// Adds the samples of senders that no link brings any light of, though nothing proves them hidden, as if they were all but hidden; and returns
+/// where they are.
+pub(crate) fn hidden<H: Hierarchy>(
+    hierarchy: &H,
+    (leaf, place): (NodeId, &Place),
+    (peak, error): (impl Fn(&Incident) -> f32, f32),
+    incident: &mut Vec<Incident>,
+    doubtful: &mut Vec<Doubtful>,
+) {
+    for receiver in std::iter::successors(Some(leaf), |&node| hierarchy.parent(node)) {
+        let from = Place::new(hierarchy.center(receiver), hierarchy.normals(receiver).axis);
+        for transfer in hierarchy.hidden(receiver) {
+            let first = incident.len();
+            arrive(hierarchy, (&IlluminationSample::new(&transfer), &from), place, true, incident);
+            let unoccluded = incident[first..].iter().map(&peak).fold(0.0, f32::max);
+            if unoccluded < LOOKED_FOR * error {
+                incident.truncate(first);
+                continue;
+            }
+            incident[first..].iter_mut().for_each(|sample| sample.irradiance *= NEXT_TO_NOTHING);
+            let rays = if receiver == leaf { KNOWN } else { 0.0 };
+            doubtful.push(Doubtful { sender: transfer.sender, first, end: incident.len(), unoccluded, rays });
         }
     }
 }
@@ -484,52 +560,111 @@ mod tests {
         assert!(incident.len() <= 1 + 4 + 36, "walls are merged: {} samples", incident.len());
     }
 
-    /// Knows what is really seen.
-    struct Seen(Rgb);
+    /// A lamp above a leaf, which a fourth of something larger sees, and what is really seen of it.
+    struct Seen {
+        /// Irradiance that a look finds.
+        look: Rgb,
+        /// What the leaf has found out itself over what the link brings.
+        brought: Option<f32>,
+        /// Whether no link brings anything.
+        hidden: bool,
+    }
+
+    const LEAF: NodeId = NodeId(7);
+    const ABOVE: NodeId = NodeId(3);
+    const LAMP: NodeId = NodeId(1);
+    const PROVED: NodeId = NodeId(9);
+    const UNOCCLUDED: f32 = 4.0;
 
     impl Hierarchy for Seen {
-        fn parent(&self, _: NodeId) -> Option<NodeId> {
-            None
+        fn parent(&self, node: NodeId) -> Option<NodeId> {
+            (node == LEAF).then_some(ABOVE)
         }
-        fn center(&self, _: NodeId) -> Vec3 {
-            Vec3::ZERO
+        fn center(&self, node: NodeId) -> Vec3 {
+            if node == LAMP || node == PROVED { Vec3::Z } else { Vec3::ZERO }
         }
         fn radius(&self, _: NodeId) -> f32 {
-            1.0
+            0.01
         }
         fn normals(&self, _: NodeId) -> hr_diffuse::Cone {
-            hr_diffuse::Cone::SPHERE
+            hr_diffuse::Cone { axis: Vec3::Z, cos_angle: 1.0 }
         }
         fn material(&self, _: NodeId) -> Option<u32> {
-            None
+            Some(0)
         }
         fn seen(&self, _: NodeId, sender: NodeId) -> Option<f32> {
-            (sender != NodeId(9)).then_some(0.25)
+            (sender != PROVED).then_some(if self.hidden { 0.0 } else { 0.25 })
         }
-        fn look(&self, _: NodeId, _: NodeId, rays: u32) -> Option<Rgb> {
+        fn brought(&self, _: NodeId, _: NodeId, _: NodeId) -> Option<f32> {
+            self.brought
+        }
+        fn hidden(&self, receiver: NodeId) -> Vec<Transfer> {
+            let transfer =
+                Transfer { sender: LAMP, direction: Vec3::Z, irradiance: Rgb::splat(UNOCCLUDED), oriented: true };
+            if self.hidden && receiver == ABOVE { vec![transfer] } else { Vec::new() }
+        }
+        fn look(&self, leaf: NodeId, _: NodeId, rays: u32) -> Option<Rgb> {
             assert!((LEAST_LOOKS..=MOST_LOOKS).contains(&rays), "{rays} rays");
-            Some(self.0)
+            assert_eq!(leaf, LEAF, "nobody else looks");
+            Some(self.look)
         }
+    }
+
+    /// The irradiance that a leaf has of a lamp by a sample that a receiver got, as far as it matters for this error.
+    fn found(host: &Seen, (receiver, sender): (NodeId, NodeId), error: f32) -> f32 {
+        let irradiance = Rgb::splat(0.25 * UNOCCLUDED);
+        let transfer = Transfer { sender, direction: Vec3::Z, irradiance, oriented: true };
+        let own = [IlluminationSample::new(&transfer)].to_vec();
+        let nothing = SampleSet::new();
+        let path = match (host.hidden, receiver == LEAF) {
+            (true, _) => [&nothing, &nothing],
+            (false, true) => [&nothing, &own],
+            (false, false) => [&own, &nothing],
+        };
+        let place = Place::new(Vec3::ZERO, Vec3::Z);
+        let peak = |sample: &Incident| sample.irradiance.x;
+        let (mut incident, mut doubtful) = (Vec::new(), Vec::new());
+        arriving_as(host, (LEAF, &path), &place, true, &mut incident, |origin, samples| {
+            doubtful.extend(brought(host, LEAF, (&origin, samples), peak));
+        });
+        hidden(host, (LEAF, &place), (peak, error), &mut incident, &mut doubtful);
+        look_again(host, LEAF, &doubtful, error, &mut incident);
+        sum(&incident).x
     }
 
     #[test]
     fn bright_senders_are_looked_for() {
-        let [leaf, above] = [NodeId(7), NodeId(3)];
-        let sample = |irradiance: f32| Incident { irradiance: Rgb::splat(irradiance), ..Incident::default() };
-        // Of a leaf's own, of one that is proved to be seen, of a dim one, of one in two parts, and of one that is dim as little is seen.
-        let all = [4.0, 4.0, 0.01, 1.0, 3.0, 0.2].map(sample);
-        let origin = |receiver, sender, end| Origin { receiver, sender: NodeId(sender), end };
-        let origins =
-            [origin(leaf, 1, 1), origin(above, 9, 2), origin(above, 1, 3), origin(above, 2, 5), origin(above, 4, 6)];
-        let found = |seen: Rgb| {
-            let mut incident = all;
-            let peak = |sample: &Incident| sample.irradiance.x;
-            look_again(&Seen(seen), leaf, &origins, (peak, 1.0), &mut incident);
-            incident.map(|sample| sample.irradiance)
-        };
-        let expected = [4.0, 4.0, 0.01, 2.0, 6.0, 8.0].map(Rgb::splat);
-        assert_eq!(found(Rgb::splat(8.0)), expected, "parts in proportion");
-        assert_eq!(found(Rgb::ZERO)[3..], [Rgb::ZERO; 3], "what is hidden is dark");
+        let host = |look: f32| Seen { look: Rgb::splat(look), brought: None, hidden: false };
+        for look in [0.0, 1.5, UNOCCLUDED] {
+            assert_eq!(found(&host(look), (ABOVE, LAMP), 1.0), look, "what something larger sees tells nothing");
+            assert_eq!(found(&host(look), (ABOVE, PROVED), 1.0), 1.0, "it is proved to be seen");
+            assert_eq!(found(&host(look), (ABOVE, LAMP), 11.0), 1.0, "too dim, were all of it seen");
+            // 16 rays, and 4 that are known of.
+            let own = found(&host(look), (LEAF, LAMP), 1.0);
+            assert!((own - (0.2 + 0.8 * look)).abs() < 1e-5, "together with what the leaf's own link found: {own}");
+        }
+    }
+
+    #[test]
+    fn what_leaves_found_out_counts() {
+        for brought in [0.0, 0.5, 4.0] {
+            let host = |look: f32| Seen { look: Rgb::splat(look), brought: Some(brought), hidden: false };
+            let dim = found(&host(UNOCCLUDED), (ABOVE, LAMP), 11.0);
+            assert!((dim - brought).abs() < 1e-5, "{dim} of what would bring 1 everywhere, {brought} here");
+            let bright = found(&host(UNOCCLUDED), (ABOVE, LAMP), 1.0);
+            assert!(
+                (bright - (0.2 * brought + 0.8 * UNOCCLUDED)).abs() < 1e-5,
+                "and what a closer look finds: {bright}"
+            );
+        }
+    }
+
+    #[test]
+    fn senders_that_no_link_sees_are_looked_for() {
+        let host = |look: f32| Seen { look: Rgb::splat(look), brought: None, hidden: true };
+        assert!((found(&host(UNOCCLUDED), (ABOVE, LAMP), 1.0) / UNOCCLUDED - 1.0).abs() < 1e-5, "all of it is seen");
+        assert_eq!(found(&host(0.0), (ABOVE, LAMP), 1.0), 0.0, "it is hidden");
+        assert_eq!(found(&host(UNOCCLUDED), (ABOVE, LAMP), 11.0), 0.0, "too dim, were all of it seen");
     }
 
     #[test]

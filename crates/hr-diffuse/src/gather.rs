@@ -265,6 +265,22 @@ impl Gather {
         self.push.looked_at(elements, place)
     }
 
+    /// What a part of a place, so far from its middle, has of a link's light over what it brings to its receiver, if the place looked for itself.
+    pub(crate) fn brought(
+        &self,
+        elements: &Elements,
+        (index, from_middle): (usize, Vec3),
+        (receiver, at): (u32, usize),
+    ) -> Option<f32> {
+        let weight = self.push.weight_of(elements, index, (receiver, at))?;
+        Some(weight.looked(from_middle)? * self.rows[index][weight.group(self.groups[at]) as usize])
+    }
+
+    /// How a link's light is spread over what lies below its receiver.
+    pub(crate) fn spread(&self, at: usize) -> Spread {
+        self.push.spreads[at]
+    }
+
     /// What links deliver: [`lit`](Self::lit).
     fn lit_areas<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<f32> {
         let nodes = &light.elements.nodes;

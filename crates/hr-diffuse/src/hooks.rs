@@ -104,6 +104,16 @@ pub trait Hierarchy: Sync {
     fn seen(&self, _receiver: NodeId, _sender: NodeId) -> Option<f32> {
         None
     }
+    /// What of a link's light a leaf below its receiver has, over what the link brings to the receiver: mean irradiance of the leaf by
+    /// the sender, over that of the [`Transfer`]. `None` where the leaf has not looked for itself.
+    fn brought(&self, _leaf: NodeId, _receiver: NodeId, _sender: NodeId) -> Option<f32> {
+        None
+    }
+    /// What links to a receiver would carry if nothing lay between, of those that carry nothing as all of the few rays shot along them
+    /// were blocked: a part of the receiver may see such a sender.
+    fn hidden(&self, _receiver: NodeId) -> Vec<Transfer> {
+        Vec::new()
+    }
     /// Irradiance (W/m²) that a sender makes on a flat leaf with as much as the leaf sees of it, by so many rays from all over it; `None`
     /// where nobody looks.
     fn look(&self, _leaf: NodeId, _sender: NodeId, _rays: u32) -> Option<Rgb> {

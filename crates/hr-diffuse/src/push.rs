@@ -213,6 +213,25 @@ impl Push {
         found
     }
 
+    /// The weight of a place for one link above it, by its receiver and position among all links, if the place has looked closely at it.
+    pub(crate) fn weight_of(&self, elements: &Elements, index: usize, (receiver, at): (u32, usize)) -> Option<Weight> {
+        let range = self.first.get(index..index + 2)?;
+        let own = |node: u32| {
+            let range = self.first_weighted[node as usize] as usize..self.first_weighted[node as usize + 1] as usize;
+            &self.weighted[range]
+        };
+        let place = self.places.nodes[index];
+        let (mut node, mut before) = (place, 0);
+        while node != receiver {
+            before += own(node).len();
+            node = if node == 0 { return None } else { elements.nodes[node as usize].parent };
+        }
+        before += own(receiver).binary_search(&(at as u32)).ok()?;
+        let numbers = if elements.nodes[place as usize].is_patch() { 1 } else { Weight::NUMBERS };
+        let first = range[0] + before * numbers;
+        self.weights.get(first..first + numbers).map(Weight::of)
+    }
+
     /// Bytes of the weights that are kept.
     pub(crate) fn weight_bytes(&self) -> u64 {
         size_of_val(self.weights.as_slice()) as u64
@@ -357,6 +376,11 @@ impl Weight {
     /// The group that it counts to at its place, of a link of a group: how much is seen of what lies beyond a lamp is not known there.
     pub(crate) fn group(&self, of_link: Group) -> Group {
         if self.unseen && of_link == Group::Rest { Group::Faint } else { of_link }
+    }
+
+    /// What it is so far from the middle, if the place looked for itself.
+    pub(crate) fn looked(&self, from_middle: Vec3) -> Option<f32> {
+        (!self.unseen).then_some((self.value + self.slope.dot(from_middle)).max(0.0))
     }
 
     /// Not below 0 within a radius.

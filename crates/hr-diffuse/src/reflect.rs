@@ -41,7 +41,7 @@ const DETAIL_SHARE: f32 = 0.02;
 const LEAST_VISIBILITY: f32 = 0.1;
 /// What differs by less than this share of the error asked for, times the mean radiance of diffuse white, is negligible where
 /// leaves themselves are looked at.
-const SHOWN_SHARE: f32 = 0.5;
+const SHOWN_SHARE: f32 = 0.25;
 /// What a distribution that is shown may be wrong by, relative to itself: at least this, or the error asked for where that is less; and at
 /// most half, or highlights would lose their outline.
 const SHOWN_ERROR: [f32; 2] = [0.1, 0.5];
@@ -445,7 +445,8 @@ impl<L: LightField> Solver<L> {
         shown: bool,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> (Vec<L::Exitant>, u64) {
-        let (elements, closely) = (&self.elements, Closely::new(self.light(), &self.links));
+        let gather = Some(&self.gather).filter(|gather| shown && gather.is_for(&self.links));
+        let (elements, closely) = (&self.elements, Closely::new(self.light(), &self.links, gather));
         let reflect = |&Standing { leaf, spread, negligible, error }: &Standing| {
             let mut path: Vec<&L::Incident> = vec![&self.incident[leaf as usize]];
             let mut node = leaf;

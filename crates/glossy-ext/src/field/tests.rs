@@ -128,7 +128,7 @@ fn coarse_distributions_keep_their_power() {
         let across = Vec2::from_angle(std::f32::consts::TAU * v) * u.sqrt();
         exact += reflection.toward(across.extend((1.0 - u).sqrt()));
     }
-    exact *= std::f32::consts::PI / f32::from(STEPS).powi(2);
+    exact *= PI / f32::from(STEPS).powi(2);
     let off = |distribution: &Haar| (distribution.cosine_integral(Vec3::Z) / exact - 1.0).x;
     let mut distribution = field.project(&reflection);
     let before = off(&distribution);
@@ -136,6 +136,31 @@ fn coarse_distributions_keep_their_power() {
     let after = off(&distribution);
     assert!(before.abs() > 0.1, "it is coarse: off by {before}");
     assert!(after.abs() < 0.03, "off by {after}, {before} before");
+}
+
+/// What is negligible by itself adds up where a distribution is coarse: its tails pay for that, not its highlight.
+#[test]
+fn highlights_do_not_pay_for_coarse_tails() {
+    let metal: Arc<dyn Reflector> = Arc::new(MetallicRoughness::new(Rgb::splat(0.5), 1.0, 0.35).expect("a metal"));
+    let field = GlossyField::new(&[metal], Refinement::default());
+    let direction = Vec3::new(0.5, 0.2, 1.0).normalize();
+    let floor = Floor { points: vec![direction] };
+    let irradiance = Rgb::ONE;
+    let mut incident = SampleSet::new();
+    field.receive(&mut incident, &Transfer { sender: NodeId(1), direction, irradiance, oriented: true });
+    let toward = Vec3::new(-direction.x, -direction.y, direction.z);
+    let arrived =
+        |negligible: f32| Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible, error: 0.4, shown: true };
+    let reflection =
+        |negligible| field.reflection(&floor, FLOOR, &[&incident], arrived(negligible)).expect("it is lit");
+    let coarse = reflection(0.1 * reflection(0.0).toward(toward).x);
+    let mut distribution = field.project(&coarse);
+    let measured = |distribution: &Haar| (distribution.cosine_integral(Vec3::Z).x, distribution.eval(toward).x);
+    let before = measured(&distribution);
+    coarse.conserve(&mut distribution, irradiance);
+    let after = measured(&distribution);
+    assert!(before.0 > 1.05 * after.0, "coarse tails make more power: {}, {} after", before.0, after.0);
+    assert!(after.1 > 0.97 * before.1, "the highlight stays: {}, {} after", before.1, after.1);
 }
 
 /// A white metal that loses nothing between its facets reflects all, from wherever it comes; narrow lobes, too.

@@ -11,6 +11,11 @@ use hr_diffuse::Cone;
 use std::cell::RefCell;
 use std::f32::consts::{FRAC_PI_2, PI};
 
+/// Where a function is brighter than this share of its largest value, …
+const BRIGHT: f32 = 0.3;
+/// … interpolation is wrong by no more than this, relative to it, or the top of a wide highlight would be cut off.
+const BRIGHT_ERROR: f32 = 0.15;
+
 /// When a triangle is subdivided.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refiner {
@@ -80,7 +85,11 @@ impl Refinement {
         let spread = self.spread(variation);
         match self.refiner {
             Refiner::Relative(epsilon) => spread > epsilon * size,
-            Refiner::Interpolation(epsilon) => spread > interpolated(epsilon, error) * size,
+            Refiner::Interpolation(epsilon) => {
+                let error = interpolated(epsilon, error);
+                let bright = size > BRIGHT * largest;
+                spread > size * if bright { error.min(BRIGHT_ERROR.max(epsilon)) } else { error }
+            }
             Refiner::Absolute(threshold) => spread > threshold,
         }
     }

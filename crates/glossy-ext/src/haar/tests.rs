@@ -534,3 +534,29 @@ proptest! {
         prop_assert!((e / f - 1.0).abs() < 0.02, "energy {e} for {f}");
     }
 }
+
+/// The top of a lobe is shown as it is, however much may be wrong elsewhere.
+#[test]
+fn tops_of_highlights_are_not_cut_off() {
+    let f = lobe(Vec3::new(0.3, 0.5, 0.8).normalize(), 60.0);
+    let known = Known { error: 0.5, ..Known::NOTHING };
+    let made = Haar::project(&Refinement::default(), &known, &f);
+    let top = directions(20_000).map(|d| (f(d).x, d)).filter(|(right, _)| *right > 0.5);
+    let (off, all) =
+        top.fold((0.0, 0.0), |(off, all), (right, d)| (off + (made.distribution.eval(d).x - right).abs(), all + right));
+    assert!(off < 0.05 * all, "off by {} where half may be wrong", off / all);
+}
+
+#[test]
+fn shrinking_leaves_what_is_below_zero() {
+    let f = |d: Vec3| Rgb::new(d.x, d.y, 0.3);
+    let mut made = project(&settings(2, 2, 0.1), f);
+    let before = made.clone();
+    let by = Rgb::new(0.1, 0.2, 0.5);
+    Basis::shrink(&mut made, by);
+    for direction in leaves(&before).iter().map(|(triangle, _)| triangle.corners[0]) {
+        let (was, is) = (before.eval(direction), made.eval(direction));
+        let right = was - was.clamp(Rgb::ZERO, by);
+        assert!((is - right).abs().max_element() < 4.0 * STORED, "{was} became {is}, not {right}");
+    }
+}
