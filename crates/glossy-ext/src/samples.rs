@@ -167,7 +167,7 @@ const LOOKS: f32 = 16.0;
 /// … but at least and at most so many.
 const LEAST_LOOKS: u32 = 3;
 const MOST_LOOKS: u32 = 16;
-/// Of what is let through there is this share at least.
+/// Links of which each leaf finds out how much they let through carry this share at least.
 const LEAST_SEEN: f32 = 0.01;
 /// What leaves found out themselves rests on so many rays.
 const KNOWN: f32 = 4.0;
@@ -182,12 +182,13 @@ fn sum(samples: &[Incident]) -> Rgb {
 /// Scales samples so that together they are an irradiance.
 fn scale(samples: &mut [Incident], now: Rgb) {
     let before = sum(samples);
-    for sample in samples {
-        sample.irradiance = Rgb::select(before.cmpgt(Rgb::ZERO), sample.irradiance * now / before, Rgb::ZERO);
-    }
+    // Light may be so strong or weak that its square is no number.
+    let factor = Rgb::select(before.cmpgt(Rgb::ZERO), now / before, Rgb::ZERO);
+    samples.iter_mut().for_each(|sample| sample.irradiance *= factor);
 }
 
-/// Samples of one origin as the leaf has found out that they arrive, and whether that is worth a closer look.
+/// Makes samples of one origin what the leaf has found out that they bring; and tells how bright they may be, if nothing proves how much
+/// of their sender the leaf sees.
 pub(crate) fn brought<H: Hierarchy>(
     hierarchy: &H,
     leaf: NodeId,
@@ -236,8 +237,8 @@ pub(crate) fn look_again<H: Hierarchy>(
     }
 }
 
-/// Adds the samples of senders that no link brings any light of, though nothing proves them hidden, as if they were all but hidden; and returns
-/// where they are.
+/// Adds the samples of senders that no link brings any light of, though nothing proves them hidden, as if they were all but hidden, to be
+/// [looked for](look_again).
 pub(crate) fn hidden<H: Hierarchy>(
     hierarchy: &H,
     (leaf, place): (NodeId, &Place),
@@ -642,6 +643,20 @@ mod tests {
             // 16 rays, and 4 that are known of.
             let own = found(&host(look), (LEAF, LAMP), 1.0);
             assert!((own - (0.2 + 0.8 * look)).abs() < 1e-5, "together with what the leaf's own link found: {own}");
+        }
+    }
+
+    #[test]
+    fn samples_are_scaled_however_strong() {
+        for strength in [1e-30_f32, 1.0, 1e30] {
+            let mut samples = [1.0, 3.0, 0.0].map(|share| Incident {
+                irradiance: Rgb::new(share * strength, 2.0 * share * strength, 0.0),
+                ..Incident::default()
+            });
+            scale(&mut samples, Rgb::splat(8.0 * strength));
+            let found = samples.map(|sample| sample.irradiance / strength);
+            let right = [[2.0, 2.0, 0.0], [6.0, 6.0, 0.0], [0.0; 3]].map(Rgb::from);
+            assert!(found.iter().zip(right).all(|(a, b)| (*a - b).abs().max_element() < 1e-5), "{found:?}");
         }
     }
 
