@@ -114,32 +114,38 @@ mod tests {
     use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
     use glam::DVec3;
 
+    fn quad(o: DVec3, a: DVec3, b: DVec3) -> Shape {
+        Shape::Quad([o, o + a, o + a + b, o + b])
+    }
+
+    /// A solver of a floor, a lamp, and what else there is, which reflects so much; with the nodes of floor and lamp.
+    fn solver(shapes: &[Shape], reflectance: f32, error: f32) -> (Solver, [u32; 2]) {
+        let material = |reflectance, exitance| DiffuseMaterial {
+            reflectance: Rgb::splat(reflectance),
+            exitance: Rgb::splat(exitance),
+            two_sided: true,
+        };
+        let surface = |(at, shape): (usize, &Shape)| Surface::new(shape.clone(), u32::from(at == 1));
+        let input = SceneInput {
+            surfaces: shapes.iter().enumerate().map(surface).collect(),
+            materials: vec![material(reflectance, 0.0), material(0.0, 1.0)],
+            ..SceneInput::default()
+        };
+        let solver = Solver::new(&input, Settings::with_error(error), ()).expect("the scene is sound");
+        let nodes = [0, 1].map(|surface| solver.elements.surface_nodes[surface][0]);
+        (solver, nodes)
+    }
+
     /// A floor in four parts below a small lamp, which a sheet hides from two of them; one link to all of it.
     #[test]
     fn leaves_see_what_the_floor_does_not_tell() {
-        let quad = |o: DVec3, a: DVec3, b: DVec3| Shape::Quad([o, o + a, o + a + b, o + b]);
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
         let shapes = [
             quad(DVec3::ZERO, x, y),
             quad(DVec3::new(0.2, 0.45, 0.9), y * 0.1, x * 0.1),
             quad(DVec3::new(0.5, 0.0, 0.0), y, z),
         ];
-        let material = |exitance| DiffuseMaterial {
-            reflectance: Rgb::splat(0.5),
-            exitance: Rgb::splat(exitance),
-            two_sided: true,
-        };
-        let input = SceneInput {
-            surfaces: shapes
-                .into_iter()
-                .zip([0, 1, 0])
-                .map(|(shape, material)| Surface::new(shape, material))
-                .collect(),
-            materials: vec![material(0.0), material(1.0)],
-            ..SceneInput::default()
-        };
-        let mut solver = Solver::new(&input, Settings::with_error(0.5), ()).expect("the scene is sound");
-        let [floor, lamp] = [0, 1].map(|surface| solver.elements.surface_nodes[surface][0]);
+        let (mut solver, [floor, lamp]) = solver(&shapes, 0.5, 0.5);
         solver.elements.split(&solver.scene, floor);
         let count = solver.elements.nodes.len();
         solver.exitant.radiosity = vec![Rgb::ZERO; count];
@@ -165,33 +171,17 @@ mod tests {
     /// A floor, half of which a sheet hides from a lamp: what leaves found out of each link against many rays.
     #[test]
     fn leaves_know_what_they_have_of_a_link() {
-        let quad = |o: DVec3, a: DVec3, b: DVec3| Shape::Quad([o, o + a, o + a + b, o + b]);
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
         let shapes = [
             quad(DVec3::ZERO, x, y),
             quad(DVec3::new(0.2, 0.3, 0.9), y * 0.4, x * 0.4),
             quad(DVec3::new(0.55, 0.0, 0.2), y, z * 0.5),
         ];
-        let material = |reflectance, exitance| DiffuseMaterial {
-            reflectance: Rgb::splat(reflectance),
-            exitance: Rgb::splat(exitance),
-            two_sided: true,
-        };
-        let input = SceneInput {
-            surfaces: shapes
-                .into_iter()
-                .zip([0, 1, 0])
-                .map(|(shape, material)| Surface::new(shape, material))
-                .collect(),
-            materials: vec![material(0.3, 0.0), material(0.0, 1.0)],
-            ..SceneInput::default()
-        };
-        let mut solver = Solver::new(&input, Settings::with_error(0.2), ()).expect("the scene is sound");
+        let (mut solver, [floor, lamp]) = solver(&shapes, 0.3, 0.2);
         solver.solve(&mut |_| std::ops::ControlFlow::Continue(()));
         let light = solver.light();
         let closely = Closely::new(light, &solver.links, Some(&solver.gather));
         let without = Closely::new(light, &solver.links, None);
-        let [floor, lamp] = [0, 1].map(|surface| solver.elements.surface_nodes[surface][0]);
         let is_below = |node: u32, root: u32| {
             std::iter::successors(Some(NodeId(node)), |&node| closely.parent(node)).any(|node| node == NodeId(root))
         };
@@ -222,21 +212,9 @@ mod tests {
     /// A link whose few rays were blocked, though nothing proves that all are.
     #[test]
     fn what_lets_nothing_through_is_told() {
-        let quad = |o: DVec3, a: DVec3, b: DVec3| Shape::Quad([o, o + a, o + a + b, o + b]);
         let (x, y) = (DVec3::X, DVec3::Y);
         let shapes = [quad(DVec3::ZERO, x, y), quad(DVec3::Z, y, x)];
-        let material = |exitance| DiffuseMaterial {
-            reflectance: Rgb::splat(0.5),
-            exitance: Rgb::splat(exitance),
-            two_sided: true,
-        };
-        let input = SceneInput {
-            surfaces: shapes.into_iter().zip([0, 1]).map(|(shape, material)| Surface::new(shape, material)).collect(),
-            materials: vec![material(0.0), material(1.0)],
-            ..SceneInput::default()
-        };
-        let mut solver = Solver::new(&input, Settings::with_error(0.5), ()).expect("the scene is sound");
-        let [floor, lamp] = [0, 1].map(|surface| solver.elements.surface_nodes[surface][0]);
+        let (mut solver, [floor, lamp]) = solver(&shapes, 0.5, 0.5);
         let count = solver.elements.nodes.len();
         solver.exitant.radiosity = vec![Rgb::ONE; count];
         let told = |visibility: f32| {
