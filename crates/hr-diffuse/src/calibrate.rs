@@ -113,7 +113,9 @@ pub(crate) fn calibrate<L: LightField>(
         power += weight(of) * f64::from(of.mean);
     }
     let mean = power / area;
-    let total = 2.0 * power;
+    // Half of the rays as if all places were lit alike, half as they are; and more where errors count more.
+    let looks = |of: &Expected| (mean + f64::from(of.mean)) * f64::from(light.exitant.adaptation[of.place as usize]);
+    let total: f64 = expected.iter().map(|of| weight(of) * looks(of)).sum();
     if !(total > 0.0 && total.is_finite()) {
         return Some((vec![1.0; expected.len()], 0));
     }
@@ -122,7 +124,7 @@ pub(crate) fn calibrate<L: LightField>(
     let counts: Vec<(u32, f64)> = expected
         .iter()
         .map(|of| {
-            let share = weight(of) * (mean + f64::from(of.mean)) / total * rays as f64;
+            let share = weight(of) * looks(of) / total * rays as f64;
             let first = sum.round() as u64;
             sum += share;
             let count = (sum.round() as u64 - first) as u32;

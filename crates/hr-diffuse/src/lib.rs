@@ -18,6 +18,7 @@ mod clock;
 mod closely;
 mod columns;
 pub mod cone;
+mod contact_shadows;
 mod contacts;
 mod convergence;
 pub mod error;

@@ -4,6 +4,7 @@ use crate::adaptation::adaptation;
 use crate::beams::solid_angle;
 use crate::budget::{Account, Budget, Spent};
 use crate::clock::Instant;
+use crate::contact_shadows;
 use crate::convergence::Convergence;
 use crate::error::SolveError;
 use crate::exposed::expose;
@@ -72,6 +73,11 @@ const MOST_LIGHT: f32 = 1e30;
 /// From one iteration to the next no more of a change is left than the share that the brightest material reflects, and this.
 const REFLECTED_MARGIN: f32 = 0.02;
 
+/// Light is to settle everywhere: how much has changed is a share of what there is in the same place, or of so much of the scene's mean
+/// irradiance where it is dimmer.
+const DIM_SHARE: f32 = 0.03;
+/// What places change by on average counts as so much of what all light changes by: iterations end when a tenth of the error is to come.
+const THERE_SHARE: f64 = 0.2;
 /// Channels with less than this share of the strongest one's light need not converge by themselves.
 const FAINT_CHANNEL: f64 = 1e-3;
 
@@ -658,15 +664,22 @@ impl<L: LightField> Solver<L> {
         *stopped |= refined.stopped;
         self.stats.spent = self.stats.spent.or(refined.spent);
         self.links = Links::new([fine, refined.links].concat(), light.elements.nodes.len());
-        if refined.edges > 0 && !refined.stopped && refined.spent.is_none() {
+        if !refined.stopped && refined.spent.is_none() {
             let (account, links) = (&self.account, self.links.all().len() as u64);
-            self.stats.rays += shadows::sew(&mut light, &self.links, tolerance, &mut |nodes| {
+            let mut watch = |nodes| {
                 *stopped = *stopped
                     || watch(&Progress { phase: Phase::Refine, fraction: pass.fraction(0.6), error, links, nodes })
                         .is_break();
                 let over = *stopped || account.is_late() || account.is_full::<L>(nodes, links);
                 if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            });
+            };
+            // Where all links are proved free nothing hides anything.
+            if pass.closely && !self.edges_known && self.stats.rays + refined.rays > 0 {
+                self.stats.rays += contact_shadows::split(&mut light, tolerance, &mut watch);
+            }
+            if refined.edges > 0 {
+                self.stats.rays += shadows::sew(&mut light, &self.links, tolerance, &mut watch);
+            }
         }
         self.edges_known |= pass.closely && !*stopped && self.stats.spent.is_none();
         let count = self.elements.nodes.len();
@@ -705,9 +718,12 @@ impl<L: LightField> Solver<L> {
     }
 
     /// Adds what the iterations to come would, where that is known. Returns the change since `before`, relative to the
-    /// light there is: that of the channel that changed most.
+    /// light there is, of all or on average over places: the larger one, of the channel that changed most.
     fn extrapolate(&mut self, before: &[Rgb]) -> f32 {
         let (mut change, mut moved, mut total) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        let dim = DIM_SHARE * self.mean_irradiance();
+        // Of each place by itself, and the area of all.
+        let (mut moved_there, mut area) = (0.0, 0.0);
         for leaf in self.elements.patch_leaves() {
             let (element, leaf) = (&self.elements.nodes[leaf as usize], leaf as usize);
             let weight = f64::from(element.area * element.importance);
@@ -716,6 +732,8 @@ impl<L: LightField> Solver<L> {
             change += weight * delta;
             moved += weight * delta.abs();
             total += weight * now.as_dvec3();
+            moved_there += weight * f64::from(delta_share(now, before[leaf], dim));
+            area += weight;
         }
         // Directional light comes in steps: those are no series.
         let ahead = if self.elements.nodes[0].active { Rgb::ZERO } else { self.convergence.ahead(change) };
@@ -728,7 +746,11 @@ impl<L: LightField> Solver<L> {
         }
         // Channels in which there is next to nothing need not converge by themselves.
         let total = total.max(DVec3::splat(FAINT_CHANNEL * total.max_element()));
-        if total.max_element() > 0.0 { (moved / total).max_element() as f32 } else { 0.0 }
+        if total.max_element() > 0.0 {
+            (moved / total).max_element().max(THERE_SHARE * moved_there / area) as f32
+        } else {
+            0.0
+        }
     }
 
     /// Read access to hierarchy and exitant light.
@@ -905,6 +927,12 @@ impl<L: LightField> Solver<L> {
             nodes: self.elements.nodes.len() as u64,
         }
     }
+}
+
+/// By which share of what there is in a place its irradiance has changed; where it is dimmer than `dim`, by which share of that.
+fn delta_share(now: Rgb, before: Rgb, dim: f32) -> f32 {
+    let share = (now - before).abs().max_element() / now.max_element().max(dim);
+    if share.is_finite() { share } else { 0.0 }
 }
 
 /// By material: what is reflected beside the diffuse part, as diffuse and as directional light.

@@ -1,0 +1,208 @@
+//! Contact shadows: leaves are split where something near takes their light away.
+//!
+//! Below a ball the floor is dark, though none of the many senders that light it casts a shadow that would count by itself: each link is
+//! fine enough, and all of them together are wrong alike. So each leaf whose light counts finds out by rays from all over it how open its
+//! surroundings are, and is split where one part of it is shut in and another is not. Nothing is near that is farther away than the leaf is
+//! large: so the smaller leaves are, the less is near, and they are small only where things touch, or all but.
+
+use crate::Rgb;
+use crate::hierarchy::{Element, Kind};
+use crate::hooks::LightField;
+use crate::refine::{MutableLight, Tolerance, can_split};
+use crate::sampling::{cosine_direction, hash, point4};
+use crate::threads::{self, prelude::*};
+use crate::transport::Light;
+use crate::vertices::INSET;
+use crate::visibility::Region;
+use glam::{Vec2, Vec3};
+use std::ops::ControlFlow;
+
+/// A leaf is looked at from so many times as many points, evenly spread from edge to edge, …
+const SIDE: u32 = 5;
+/// … in so many times as many directions, which are the same everywhere.
+const DIRECTIONS: u32 = 4;
+/// Leaves that a thread looks at between two calls of `watch`: some milliseconds.
+const BETWEEN_WATCHES: usize = 32;
+/// What lies flat on a leaf, or in its plane, is no higher than this share of its radius.
+const ABOVE: f32 = 1e-3;
+/// What all senders together bring counts as much as this share of what a single one does: a shadow in which there is nothing left is seen
+/// however small it is.
+const SHARE: f32 = 0.6;
+/// What differs by less than this share from one point to another is shown by interpolation as well.
+const SOFT: f32 = 0.6;
+
+/// Splits leaves within which openness differs by what counts, and their parts likewise. `watch` is told how many elements there are; once
+/// it breaks, no more are split. Returns the rays that were shot.
+pub(crate) fn split<L: LightField>(
+    light: &mut MutableLight<'_, L>,
+    tolerance: Tolerance,
+    watch: &mut dyn FnMut(u64) -> ControlFlow<()>,
+) -> u64 {
+    let mut rays = 0;
+    let mut leaves: Vec<u32> = light.elements.patch_leaves().collect();
+    while !leaves.is_empty() {
+        let reader = light.read();
+        let mut looked: Vec<(bool, u64)> = Vec::with_capacity(leaves.len());
+        for some in leaves.chunks(BETWEEN_WATCHES * threads::current_num_threads()) {
+            if watch(light.elements.nodes.len() as u64).is_break() {
+                return rays;
+            }
+            looked.par_extend(some.par_iter().map(|&leaf| is_partly_shut_in(reader, tolerance, leaf)));
+        }
+        let mut parts = Vec::new();
+        for (leaf, (splits, shot)) in leaves.into_iter().zip(looked) {
+            rays += shot;
+            if splits {
+                light.split(leaf);
+                let element = &light.elements.nodes[leaf as usize];
+                parts.extend(element.first_child..element.first_child + element.child_count);
+            }
+        }
+        leaves = parts;
+    }
+    rays
+}
+
+/// Whether openness differs within a leaf by what counts, and the rays that were shot to know.
+fn is_partly_shut_in<L: LightField>(light: Light<'_, L>, tolerance: Tolerance, leaf: u32) -> (bool, u64) {
+    let element = light.element(leaf);
+    // Directional light is reflected as a whole by leaves, however large.
+    let diffuse = element.reflectance.max_element() / element.importance.max(f32::MIN_POSITIVE);
+    let most = diffuse * light.weight(leaf) * light.exitant.irradiance[leaf as usize].max_element();
+    let is_covered = light.elements.exposed(leaf) < 1.0;
+    let least = SHARE * tolerance.shadow;
+    if most * SOFT <= least || !can_split(element, tolerance) || is_covered {
+        return (false, 0);
+    }
+    let mut look = Look { light, element, seed: hash(leaf, 0xc047), rays: 0 };
+    if !look.is_anything_near() {
+        return (false, 0);
+    }
+    // A few directions tell of most leaves that they are as open everywhere.
+    let few = look.differs(|direction| direction % (DIRECTIONS + 1) == 0);
+    let differs = if few < SOFT { 0.0 } else { look.differs(|_| true) };
+    (differs > SOFT && most * differs > least, look.rays)
+}
+
+/// A leaf that is looked at.
+struct Look<'a, L: LightField> {
+    light: Light<'a, L>,
+    element: &'a Element,
+    seed: u32,
+    rays: u64,
+}
+
+impl<L: LightField> Look<'_, L> {
+    /// Whether there is anything that may be near.
+    fn is_anything_near(&self) -> bool {
+        let Element { source, domain, radius, normals, .. } = *self.element;
+        let geometry = &self.light.scene.surfaces()[source as usize];
+        let height = geometry.point(geometry.middle(domain)).dot(normals.axis);
+        let below = if geometry.is_flat() { ABOVE * radius } else { -radius };
+        let region = Region {
+            bounds: geometry.bounds(domain).padded(radius),
+            normal: normals.axis,
+            heights: [height + below, height + radius],
+        };
+        self.light.scene.visibility.any_in(&region, |other| other != source)
+    }
+
+    /// By how much the share of directions in which there is light from afar differs from one point of the leaf to another, of those that
+    /// are `asked`.
+    fn differs(&mut self, asked: impl Fn(u32) -> bool) -> f32 {
+        let directions = (0..DIRECTIONS * DIRECTIONS).filter(|&direction| asked(direction));
+        let count = directions.clone().count();
+        let (mut least, mut greatest) = (count, 0);
+        for point in 0..SIDE * SIDE {
+            let place = self.place(point);
+            let open = directions.clone().filter(|&direction| self.sees_afar(place, direction)).count();
+            (least, greatest) = (least.min(open), greatest.max(open));
+        }
+        (greatest - least) as f32 / count as f32
+    }
+
+    /// A point of the leaf, with its normal.
+    fn place(&self, point: u32) -> (Vec3, Vec3) {
+        let Element { source, domain, kind, .. } = *self.element;
+        let geometry = &self.light.scene.surfaces()[source as usize];
+        let at = Vec2::new((point % SIDE) as f32, (point / SIDE) as f32) / (SIDE - 1) as f32;
+        let (x, normal) = geometry.sample(domain, at.x, at.y);
+        let inward = x.lerp(geometry.point(geometry.middle(domain)), INSET);
+        (inward, if kind == Kind::Back { -normal } else { normal })
+    }
+
+    /// Whether a point has light from afar in a direction: by itself, or by way of something near that has.
+    fn sees_afar(&mut self, (x, normal): (Vec3, Vec3), direction: u32) -> bool {
+        let u = point4(self.seed, direction);
+        let cell = Vec2::new((direction % DIRECTIONS) as f32, (direction / DIRECTIONS) as f32);
+        let along = (cell + Vec2::new(u.x, u.y)) / DIRECTIONS as f32;
+        let visibility = &self.light.scene.visibility;
+        self.rays += 1;
+        let to = cosine_direction(normal, along.x, along.y);
+        let Some(hit) = visibility.closest_except(x, to, 0.0, self.element.radius, self.element.source) else {
+            return true;
+        };
+        let facing = if hit.front { hit.normal } else { -hit.normal };
+        let material = &self.light.scene.materials[self.light.scene.surface_materials[hit.surface as usize] as usize];
+        if hit.front && material.exitance != Rgb::ZERO {
+            return true;
+        }
+        self.rays += 1;
+        let onward = cosine_direction(facing, u.z, u.w);
+        visibility.closest_except(hit.point, onward, 0.0, self.element.radius, hit.surface).is_none()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::DVec3;
+
+    /// A white room of 4 m, half of whose ceiling shines, with a ball on the floor or high above it: radius of the floor's leaves, and
+    /// distance from what is right below the ball.
+    fn leaves_below(height: f64) -> Vec<(f64, f64)> {
+        let (x, y, z) = (DVec3::X * 4.0, DVec3::Y * 4.0, DVec3::Z * 4.0);
+        let quad =
+            |o: DVec3, a: DVec3, b: DVec3, material| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), material);
+        let o = DVec3::ZERO;
+        let mut surfaces = vec![
+            quad(o, x, y, 0),
+            quad(z, y, 0.5 * x, 1),
+            quad(z + 0.5 * x, y, 0.5 * x, 0),
+            quad(o, y, z, 0),
+            quad(x, z, y, 0),
+            quad(o, z, x, 0),
+            quad(y, x, z, 0),
+        ];
+        let center = DVec3::new(2.3, 1.7, height);
+        surfaces.push(Surface::new(Shape::Sphere { center, radius: 0.4 }, 0));
+        let wall = DiffuseMaterial { reflectance: Rgb::splat(0.6), exitance: Rgb::ZERO, two_sided: false };
+        let materials = vec![wall, DiffuseMaterial { exitance: Rgb::ONE, ..wall }];
+        let input = SceneInput { surfaces, materials, ..SceneInput::default() };
+        let mut solver = Solver::new(&input, Settings::with_error(0.2), ()).expect("the room is sound");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        let scale = solver.scene.normalization.scale();
+        let floor = solver.elements.patch_leaves().map(|leaf| solver.elements.nodes[leaf as usize]);
+        let floor = floor.filter(|element| element.source == 0 && element.kind == Kind::Front);
+        let at = |element: Element| {
+            let from = solver.scene.normalization.to_scene(element.center) - center;
+            (f64::from(element.radius) / scale, from.truncate().length())
+        };
+        floor.map(at).collect()
+    }
+
+    /// Where a ball stands the floor is split more finely than where it hovers; far from there as before.
+    #[test]
+    fn leaves_are_small_where_a_ball_stands() {
+        let finest = |leaves: &[(f64, f64)]| {
+            leaves
+                .iter()
+                .filter(|(radius, apart)| apart < &(2.0 * radius))
+                .map(|(radius, _)| *radius)
+                .fold(9.0, f64::min)
+        };
+        let [stands, hovers] = [0.4, 2.0].map(|height| finest(&leaves_below(height)));
+        assert!(stands < 0.6 * hovers, "{stands}, {hovers}");
+    }
+}
