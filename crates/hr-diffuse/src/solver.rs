@@ -76,8 +76,6 @@ const REFLECTED_MARGIN: f32 = 0.02;
 /// Light is to settle everywhere: how much has changed is a share of what there is in the same place, or of so much of the scene's mean
 /// irradiance where it is dimmer.
 const DIM_SHARE: f32 = 0.03;
-/// What places change by on average counts as so much of what all light changes by: iterations end when a tenth of the error is to come.
-const THERE_SHARE: f64 = 0.2;
 /// Channels with less than this share of the strongest one's light need not converge by themselves.
 const FAINT_CHANNEL: f64 = 1e-3;
 
@@ -746,11 +744,7 @@ impl<L: LightField> Solver<L> {
         }
         // Channels in which there is next to nothing need not converge by themselves.
         let total = total.max(DVec3::splat(FAINT_CHANNEL * total.max_element()));
-        if total.max_element() > 0.0 {
-            (moved / total).max_element().max(THERE_SHARE * moved_there / area) as f32
-        } else {
-            0.0
-        }
+        if total.max_element() > 0.0 { (moved / total).max_element().max(moved_there / area) as f32 } else { 0.0 }
     }
 
     /// Read access to hierarchy and exitant light.
