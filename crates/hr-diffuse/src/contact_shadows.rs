@@ -156,53 +156,27 @@ impl<L: LightField> Look<'_, L> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::skips::Skips;
     use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
     use glam::DVec3;
 
-    /// A white room of 4 m, half of whose ceiling shines, with a ball on the floor or high above it: radius of the floor's leaves, and
-    /// distance from what is right below the ball.
-    fn leaves_below(height: f64) -> Vec<(f64, f64)> {
-        let (x, y, z) = (DVec3::X * 4.0, DVec3::Y * 4.0, DVec3::Z * 4.0);
-        let quad =
-            |o: DVec3, a: DVec3, b: DVec3, material| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), material);
-        let o = DVec3::ZERO;
-        let mut surfaces = vec![
-            quad(o, x, y, 0),
-            quad(z, y, 0.5 * x, 1),
-            quad(z + 0.5 * x, y, 0.5 * x, 0),
-            quad(o, y, z, 0),
-            quad(x, z, y, 0),
-            quad(o, z, x, 0),
-            quad(y, x, z, 0),
-        ];
-        let center = DVec3::new(2.3, 1.7, height);
-        surfaces.push(Surface::new(Shape::Sphere { center, radius: 0.4 }, 0));
-        let wall = DiffuseMaterial { reflectance: Rgb::splat(0.6), exitance: Rgb::ZERO, two_sided: false };
-        let materials = vec![wall, DiffuseMaterial { exitance: Rgb::ONE, ..wall }];
-        let input = SceneInput { surfaces, materials, ..SceneInput::default() };
-        let mut solver = Solver::new(&input, Settings::with_error(0.2), ()).expect("the room is sound");
-        solver.solve(&mut |_| ControlFlow::Continue(()));
-        let scale = solver.scene.normalization.scale();
-        let floor = solver.elements.patch_leaves().map(|leaf| solver.elements.nodes[leaf as usize]);
-        let floor = floor.filter(|element| element.source == 0 && element.kind == Kind::Front);
-        let at = |element: Element| {
-            let from = solver.scene.normalization.to_scene(element.center) - center;
-            (f64::from(element.radius) / scale, from.truncate().length())
-        };
-        floor.map(at).collect()
+    /// Whether a floor of 4 m below a ball, whose middle is so high above it, is to be split.
+    fn is_split(height: f64) -> bool {
+        let (x, y) = (DVec3::X * 4.0, DVec3::Y * 4.0);
+        let floor = Surface::new(Shape::Quad([DVec3::ZERO, x, x + y, y]), 0);
+        let ball = Surface::new(Shape::Sphere { center: DVec3::new(2.0, 2.0, height), radius: 0.4 }, 0);
+        let material = DiffuseMaterial { reflectance: Rgb::splat(0.6), exitance: Rgb::ZERO, two_sided: false };
+        let input = SceneInput { surfaces: vec![floor, ball], materials: vec![material], ..SceneInput::default() };
+        let mut solver = Solver::new(&input, Settings::with_error(0.2), ()).expect("the scene is sound");
+        solver.exitant.irradiance.fill(Rgb::ONE);
+        let tolerance =
+            Tolerance { error: 0.0, shadow: 0.01, kept_too: true, dark: false, smallest: 0.01, skips: Skips::ALL };
+        is_partly_shut_in(solver.light(), tolerance, solver.elements.surface_nodes[0][0]).0
     }
 
-    /// Where a ball stands the floor is split more finely than where it hovers; far from there as before.
     #[test]
-    fn leaves_are_small_where_a_ball_stands() {
-        let finest = |leaves: &[(f64, f64)]| {
-            leaves
-                .iter()
-                .filter(|(radius, apart)| apart < &(2.0 * radius))
-                .map(|(radius, _)| *radius)
-                .fold(9.0, f64::min)
-        };
-        let [stands, hovers] = [0.4, 2.0].map(|height| finest(&leaves_below(height)));
-        assert!(stands < 0.6 * hovers, "{stands}, {hovers}");
+    fn a_floor_is_split_where_a_ball_stands() {
+        assert!(is_split(0.4), "nothing is left where they touch");
+        assert!(!is_split(2.0), "it takes little away from above");
     }
 }
