@@ -694,8 +694,8 @@ impl<L: LightField> Solver<L> {
         self.stats.seconds.refine += start.elapsed().as_secs_f64();
     }
 
-    /// One iteration of the paper: gather, push, reflect, pull. Returns the change of the mean radiosity, relative
-    /// to it; `None`, and no change, where `watch` broke before the light was gathered.
+    /// One iteration of the paper: gather, push, reflect, pull. Returns the change of irradiance, as
+    /// [`Stats::residuals`] has it; `None`, and no change, where `watch` broke before the light was gathered.
     pub(crate) fn iterate(&mut self, how: Reflect, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Option<f32> {
         let before: Vec<Rgb> = self.exitant.irradiance.clone();
         let start = Instant::now();

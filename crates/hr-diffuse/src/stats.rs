@@ -30,7 +30,8 @@ pub struct Stats {
     pub iterations: u32,
     /// Links that light was sent over, each counted in every iteration that did so.
     pub links_evaluated: u64,
-    /// Change of the mean radiosity by each iteration, relative to its value.
+    /// Change of irradiance by each iteration, ≥ 0: relative to all there is, or on average over places to what there is in each; the
+    /// larger one.
     pub residuals: Vec<f32>,
     /// Relative L1 error of the leaves' irradiance, weighted by what they reflect, that rays have found; `None` where they did not
     /// look: the solve was broken off.
