@@ -51,7 +51,8 @@ impl Within {
             let irradiance = |&leaf: &u32| light.exitant.irradiance[leaf as usize].element_sum();
             let (low, high) =
                 around.iter().map(irradiance).fold((f32::MAX, 0.0_f32), |(low, high), e| (low.min(e), high.max(e)));
-            around.iter().all(|&leaf| is_joined[leaf as usize]) && high - low <= EDGE * high
+            // No leaf has a vertex from which cuts have taken all parts.
+            !around.is_empty() && around.iter().all(|&leaf| is_joined[leaf as usize]) && high - low <= EDGE * high
         };
         let rounds = (leaves.len() / count / LEAVES_PER_ROUND).clamp(1, MOST_ROUNDS);
         let holds = (0..vertices.positions.len() as u32).into_par_iter().with_min_len(1024).map(holds).collect();
@@ -111,8 +112,10 @@ impl Within {
 
 #[cfg(test)]
 mod tests {
+    use super::Within;
     use crate::skips::Skips;
     use crate::skips::tests::solve;
+    use crate::vertices::outlines;
     use crate::{DiffuseMaterial, Rgb, SceneInput, Shape, Solution, Surface};
     use glam::{DVec3, Vec3};
     use std::ops::ControlFlow;
@@ -124,7 +127,7 @@ mod tests {
     const WALL: f64 = 0.7;
 
     /// A floor cut into small parts below a lamp; a wall stands across it on their edges.
-    fn finished(inner_vertices: bool) -> Solution {
+    fn scene() -> SceneInput {
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
         let quad = |corner: DVec3, a: DVec3, b: DVec3| Shape::Quad([corner, corner + a, corner + a + b, corner + b]);
         let part = f64::from(PARTS).recip();
@@ -137,12 +140,15 @@ mod tests {
             exitance: Rgb::splat(exitance),
             two_sided,
         };
-        let input = SceneInput {
+        SceneInput {
             surfaces: floor.chain([lamp, wall]).collect(),
             materials: vec![material(0.5, 0.0, false), material(0.0, 1.0, false), material(0.0, 0.0, true)],
             ..SceneInput::default()
-        };
-        let solver = solve(&input, ERROR, (), Skips { inner_vertices, ..Skips::ALL });
+        }
+    }
+
+    fn finished(inner_vertices: bool) -> Solution {
+        let solver = solve(&scene(), ERROR, (), Skips { inner_vertices, ..Skips::ALL });
         solver.finish(&mut |_| ControlFlow::Continue(()))
     }
 
@@ -186,5 +192,18 @@ mod tests {
             }
         }
         assert!(off < 0.3 * ERROR * all, "off by {:.4}", off / all);
+    }
+
+    /// Cuts may leave a vertex without any leaf.
+    #[test]
+    fn vertices_of_no_leaf_are_within_nothing() {
+        let solver = solve(&scene(), ERROR, (), Skips::ALL);
+        let mut vertices = outlines(&solver.scene, &solver.elements).fans(&solver.scene, &solver.elements);
+        let left = vertices.add((Vec3::ZERO, Vec3::Z), 0, glam::Vec2::ZERO);
+        vertices.first_around.push(vertices.around.len() as u32);
+        let within = Within::new(solver.light(), solver.gather.places(), &vertices);
+        assert!(within.count() > 0 && !within.holds(left), "it has no leaves around");
+        within.fill(solver.light(), &mut vertices);
+        assert_eq!(vertices.irradiance[left as usize], Rgb::ZERO, "it gathers no light of others");
     }
 }
