@@ -169,8 +169,15 @@ mod tests {
         let input = SceneInput { surfaces: vec![floor, ball], materials: vec![material], ..SceneInput::default() };
         let mut solver = Solver::new(&input, Settings::with_error(0.2), ()).expect("the scene is sound");
         solver.exitant.irradiance.fill(Rgb::ONE);
-        let tolerance =
-            Tolerance { error: 0.0, shadow: 0.01, kept_too: true, dark: false, smallest: 0.01, skips: Skips::ALL };
+        let tolerance = Tolerance {
+            error: 0.0,
+            lost: 0.0,
+            shadow: 0.01,
+            kept_too: true,
+            dark: false,
+            smallest: 0.01,
+            skips: Skips::ALL,
+        };
         is_partly_shut_in(solver.light(), tolerance, solver.elements.surface_nodes[0][0]).0
     }
 

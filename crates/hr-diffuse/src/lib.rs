@@ -31,6 +31,7 @@ mod footprint;
 pub mod form_factor;
 mod gather;
 pub mod geometry;
+mod grazing;
 pub mod hierarchy;
 pub mod hooks;
 mod inherited;

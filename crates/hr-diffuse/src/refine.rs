@@ -10,6 +10,7 @@ use crate::budget::{Account, Growth, Spent};
 use crate::clock::Instant;
 use crate::form_factor::{self, Accuracy, Part};
 use crate::geometry::Domain;
+use crate::grazing::most_view;
 use crate::hierarchy::{Element, Elements, Kind};
 use crate::hooks::LightField;
 use crate::links::Link;
@@ -66,6 +67,10 @@ const NEIGHBOURS: f32 = 2.0;
 const PROBES: u32 = 64;
 const UNSEEN: f32 = 3.0 / PROBES as f32;
 
+/// Normals bound what surfaces see of each other where that is no more than this share of a view: of pieces of a smooth surface. In corners
+/// boxes do, by which it is told how finely corners are divided.
+const MOST_GRAZING: f32 = 0.25;
+
 /// A link to be, between two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -79,6 +84,8 @@ pub(crate) struct Pair {
 pub(crate) struct Tolerance {
     /// Irradiance × [what it counts](Light::weight) that a link may be wrong by.
     pub(crate) error: f32,
+    /// The same for what is left out for good: pairs without a link are not looked at again when errors are to be smaller.
+    pub(crate) lost: f32,
     /// The same for light that is there on one side of a shadow's edge and not on the other.
     pub(crate) shadow: f32,
     /// Whether links that are there already are looked at for it, too.
@@ -416,16 +423,20 @@ fn decide<L: LightField>(
     if own {
         return split_self(light, pair.receiver, tolerance, stopped);
     }
-    let Some(bounds) = factor_bounds(light.scene, r, s).or_else(|| (!skips.facing).then_some(FactorBounds::NONE))
+    let Some(mut bounds) = factor_bounds(light.scene, r, s).or_else(|| (!skips.facing).then_some(FactorBounds::NONE))
     else {
         return Verdict::Facing;
     };
+    let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);
+    if skips.averted && touching {
+        let most = grazing(r, s);
+        (bounds.min, bounds.max) = (bounds.min.min(most), bounds.max.min(most));
+    }
     let weight = light.weight(pair.receiver);
     let (share, contrast) = (lobes.share(light, pair.receiver), lobes.contrast(light, pair.receiver, pair.sender));
     let interval = interval(light, pair, &bounds, (tolerance.error / weight, share)).seen_with(contrast);
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
-    let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);
     let at_stake = weight * interval.most * UNSEEN;
     if skips.averted
         && touching
@@ -549,17 +560,32 @@ fn decide<L: LightField>(
     split_by_edge(&link).unwrap_or(Verdict::Keep(link))
 }
 
+/// Most of a view that the normals of two nodes allow, where they tell more than boxes do; else 1.
+fn grazing(receiver: &Element, sender: &Element) -> f32 {
+    let most = most_view(&receiver.normals, &sender.normals);
+    if most > MOST_GRAZING { 1.0 } else { most }
+}
+
 /// A node and itself: parts of a convex surface never see each other, parts of anything else may.
 fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Tolerance, stopped: bool) -> Verdict {
     let element = light.element(node);
     if element.is_flat() || element.convex && element.is_patch() {
         return Verdict::Facing;
     }
+    let weight = light.weight(node);
     if element.child_count > 0 {
-        return Verdict::SplitBoth;
+        // Of a smooth surface, parts see so little of each other that it need not be known which do.
+        let [_, diffuse] = light.diffuse_range(node);
+        let brightest = diffuse.max_element() + DIRECTIONAL_SHARE * light.directional_most(node);
+        let most = grazing(element, element);
+        let is_smooth = tolerance.skips.averted && !tolerance.dark && most < 1.0;
+        return if is_smooth && weight * most * brightest <= tolerance.lost {
+            Verdict::Facing
+        } else {
+            Verdict::SplitBoth
+        };
     }
     // The inside of a curved surface: split while the light that would be lost matters.
-    let weight = light.weight(node);
     let at_stake = light.emitted_most(node) * weight;
     let splittable = element.is_patch() && element.radius > tolerance.smallest;
     if at_stake > tolerance.error && splittable && !stopped { Verdict::SplitBoth } else { Verdict::Facing }

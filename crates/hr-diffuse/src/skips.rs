@@ -7,7 +7,7 @@ pub(crate) struct Skips {
     pub(crate) black_receivers: bool,
     /// Pairs that are proved not to face each other, …
     pub(crate) facing: bool,
-    /// … and those that hardly do, by samples.
+    /// … and those that hardly do, by their normals or by samples.
     pub(crate) averted: bool,
     /// Rays where all segments are proved free, and links where all are proved blocked.
     pub(crate) proofs: bool,

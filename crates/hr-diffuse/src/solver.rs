@@ -624,6 +624,7 @@ impl<L: LightField> Solver<L> {
         }
         let tolerance = Tolerance {
             error: self.link_error(pass.tolerance),
+            lost: self.link_error(self.settings.error.min(pass.tolerance)),
             shadow: if pass.closely || self.edges_known {
                 SHADOW_SHARE * self.settings.error * self.mean_irradiance()
             } else {

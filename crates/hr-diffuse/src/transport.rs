@@ -15,8 +15,11 @@ use std::f32::consts::PI;
 /// at a point; else its children are.
 const CLUSTER_FAR: f32 = 0.25;
 
-/// Senders that cannot bring more than this share of a place's irradiance, times the square root of the tolerance, are negligible there.
+/// Senders that bring no more than this share of a place's irradiance, times the square root of the tolerance, are negligible there.
 const NEGLIGIBLE_SHARE: f32 = 0.065;
+/// That they do is taken to be so where their directional light would bring no more with so many times its mean over all directions: a
+/// brighter lobe is so narrow that few places are in it. By its peak, next to nothing would be negligible of what shines.
+const LIKELY: f32 = 8.0;
 
 /// Exitant diffuse light per node.
 #[derive(Clone, Debug, Default)]
@@ -200,6 +203,12 @@ impl<L: LightField> Light<'_, L> {
         high.max_element() + self.directional_most(sender)
     }
 
+    /// The same in most directions: in the others peaks may be brighter.
+    fn likely_most(&self, sender: u32) -> f32 {
+        let [_, high] = self.diffuse_range(sender);
+        high.max_element() + LIKELY * self.exitant.directional[sender as usize].max_element()
+    }
+
     /// The share of the extension's light in [`emitted_most`](Self::emitted_most).
     pub(crate) fn directional_most(&self, sender: u32) -> f32 {
         let element = self.element(sender);
@@ -276,8 +285,8 @@ impl<L: LightField> Light<'_, L> {
 
     /// What [`irradiance_at`](Self::irradiance_at) returns, and the share of its view (cosine-weighted hemisphere) that
     /// the sender takes up at the point if nothing is in between; 0 for lights without extent. The shares of all that
-    /// a point really sees never sum to more than 1. Senders that cannot bring more than `negligible` (max channel) are
-    /// taken as points that send evenly.
+    /// a point really sees never sum to more than 1. Senders that are not likely to bring more than `negligible` (max channel)
+    /// are taken as points that send evenly.
     #[must_use]
     pub(crate) fn arriving_at(&self, x: Vec3, n: Vec3, sender: u32, negligible: f32) -> (Rgb, f32) {
         let element = self.element(sender);
@@ -287,7 +296,8 @@ impl<L: LightField> Light<'_, L> {
         }
         let to = x - element.center;
         let distance2 = to.length_squared();
-        if element.kind != Kind::Light && most * element.radius * element.radius < negligible * distance2 {
+        let likely = most.min(self.likely_most(sender));
+        if element.kind != Kind::Light && likely * element.radius * element.radius < negligible * distance2 {
             return self.weakly_arriving_at(to, n, sender);
         }
         let distance = distance2.sqrt();
