@@ -11,6 +11,7 @@
 //! is the same, bit by bit.
 
 mod adaptation;
+mod all_over;
 pub mod beams;
 pub mod budget;
 mod calibrate;

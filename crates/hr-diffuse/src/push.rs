@@ -7,6 +7,7 @@
 //! [`inherited`](crate::inherited).
 
 use crate::NodeId;
+use crate::all_over::{Points, Spots};
 use crate::gather::{GROUPS, Group};
 use crate::hierarchy::{Element, Elements, GRAFT, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
@@ -31,13 +32,9 @@ const FAINT_SHARE: f32 = 0.003;
 /// Leaves look for themselves at links of their own that bring more than this share of their light: others let so much through as
 /// their segments found.
 const OWN_SHARE: f32 = 0.02;
-/// Leaves and senders whose radii together are below this share of their distance are far from each other.
-const FAR: f32 = 0.25;
 /// Links that bring a leaf more than this share of its light from near by, times the square root of the tolerance, are looked at from
 /// several points of it.
 const MUCH_SHARE: f32 = 0.045;
-/// The middle of a place of many leaves stands for all of it where it gets at least this share of the mean.
-const FACES: f32 = 0.5;
 /// Points of a place lie across a line if they do by this share of their spread (of squares).
 const LEAST_SPREAD: f32 = 0.01;
 /// Irradiance × importance × √(share of all area) that a place of many leaves may be off its mean by for the edge of a shadow, as a
@@ -410,7 +407,7 @@ struct Place {
     /// Its middle, with its normal and the weight 1, …
     middle: (Vec3, Vec3, f32),
     /// … and points, normals and weights (sum 1) that stand for all of it.
-    points: SmallVec<[(Vec3, Vec3, f32); 8]>,
+    points: Points,
     /// What is brought by links that such points are worth (sum of channels).
     much: f32,
     /// Senders that bring less than this are not resolved into parts (largest channel), …
@@ -451,14 +448,20 @@ impl Place {
         Weight { value, slope, unseen: false }.positive(element.radius)
     }
 
+    /// The place by its points.
+    fn spots<L: LightField>(&self, light: Light<'_, L>) -> Spots<'_> {
+        let ((x, n, _), radius) = (self.middle, light.element(self.node).radius);
+        Spots { points: &self.points, middle: (x, n), radius, negligible: self.negligible }
+    }
+
     /// What a link brings that is wholly visible, where it varies over the place.
     fn varying<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
-        let at = |x: Vec3, n: Vec3| light.arriving_at(x, n, link.sender, self.negligible).0.element_sum();
+        let arriving = light.arriving_all_over(self.spots(light), link.sender);
         if light.element(self.node).is_patch() {
-            let value = self.points.iter().map(|&(x, n, weight)| weight * at(x, n)).sum();
+            let value = self.points.iter().zip(arriving).map(|((.., weight), arriving)| weight * arriving).sum();
             return Weight { value, ..Weight::default() };
         }
-        self.fitted(light, at)
+        self.fitted(light, &arriving)
     }
 
     /// The same of a sender that is far, by what arrives in the middle.
@@ -468,20 +471,14 @@ impl Place {
         if light.element(self.node).is_patch() || light.elements.is_distant(NodeId(link.sender)) {
             return Weight { value, ..Weight::default() };
         }
-        let sender = light.element(link.sender).center;
-        let kernel = |x: Vec3, n: Vec3| {
-            let to = sender - x;
-            to.dot(n).max(0.0) / (to.length_squared() * to.length()).max(f32::MIN_POSITIVE)
-        };
-        let fitted = self.fitted(light, kernel);
-        let in_middle = kernel(x, n);
-        // Where the middle hardly faces the sender it tells little of the rest.
-        if in_middle > FACES * fitted.value { fitted * (value / in_middle) } else { self.varying(light, link) }
+        let by_middle = self.spots(light).by_middle(light.element(link.sender), value);
+        by_middle.map_or_else(|| self.varying(light, link), |arriving| self.fitted(light, &arriving))
     }
 
-    /// The plane over a place of many leaves that fits best what is there `at` points with normals.
-    fn fitted<L: LightField>(&self, light: Light<'_, L>, at: impl Fn(Vec3, Vec3) -> f32) -> Weight {
-        let values: SmallVec<[f32; 8]> = self.points.iter().map(|&(x, n, weight)| weight * at(x, n)).collect();
+    /// The plane over a place of many leaves that fits best what is there at its points.
+    fn fitted<L: LightField>(&self, light: Light<'_, L>, arriving: &[f32]) -> Weight {
+        let values: SmallVec<[f32; 8]> =
+            self.points.iter().zip(arriving).map(|((.., weight), arriving)| weight * arriving).collect();
         let value: f32 = values.iter().sum();
         let element = light.element(self.node);
         // Of (s, t) from the mean of the points, by the normal equations.
@@ -522,9 +519,7 @@ impl Place {
         let visible = visible(link, Spread::Exact);
         // A place that is small or far is told apart by its orientation; so is one that gets next to nothing.
         let sender = light.element(link.sender);
-        let apart = sender.center.distance_squared(element.center);
-        let reach = element.radius + sender.radius;
-        let far = reach * reach < FAR * FAR * apart;
+        let far = self.spots(light).is_far(sender);
         if far && mean * visible * self.turned(light, link) < self.faint {
             return (Weight { unseen: link.visibility >= 0.0, ..self.plain(light, link) }, 0);
         }
@@ -585,7 +580,7 @@ fn renewed<L: LightField>(light: Light<'_, L>, sender: u32, at: Vec3, node: u32)
 }
 
 /// Points, normals and weights (sum 1) that stand for a place.
-fn points_of<L: LightField>(light: Light<'_, L>, node: u32) -> SmallVec<[(Vec3, Vec3, f32); 8]> {
+fn points_of<L: LightField>(light: Light<'_, L>, node: u32) -> Points {
     let element = light.element(node);
     if element.is_patch() {
         return sample_points(light.scene, element).into_iter().collect();

@@ -428,7 +428,7 @@ fn decide<L: LightField>(
         return Verdict::Facing;
     };
     let touching = r.center.distance(s.center) < NEIGHBOURS * (r.radius + s.radius);
-    if skips.averted && touching {
+    if skips.averted && touching && s.kind != Kind::Light {
         let most = grazing(r, s);
         (bounds.min, bounds.max) = (bounds.min.min(most), bounds.max.min(most));
     }

@@ -18,8 +18,10 @@ const CLUSTER_FAR: f32 = 0.25;
 /// Senders that bring no more than this share of a place's irradiance, times the square root of the tolerance, are negligible there.
 const NEGLIGIBLE_SHARE: f32 = 0.065;
 /// That they do is taken to be so where their directional light would bring no more with so many times its mean over all directions: a
-/// brighter lobe is so narrow that few places are in it. By its peak, next to nothing would be negligible of what shines.
+/// brighter lobe is so narrow that few places are in it. By its peak, next to nothing would be negligible of what shines; …
 const LIKELY: f32 = 8.0;
+/// … but a peak that would bring more than so many times what is negligible may be all that a place sees.
+const UNLIKELY: f32 = 16.0;
 
 /// Exitant diffuse light per node.
 #[derive(Clone, Debug, Default)]
@@ -296,30 +298,21 @@ impl<L: LightField> Light<'_, L> {
         }
         let to = x - element.center;
         let distance2 = to.length_squared();
-        let likely = most.min(self.likely_most(sender));
+        let likely = most.min(self.likely_most(sender).max(most / UNLIKELY));
         if element.kind != Kind::Light && likely * element.radius * element.radius < negligible * distance2 {
             return self.weakly_arriving_at(to, n, sender);
         }
-        let distance = distance2.sqrt();
-        let children = element.first_child..element.first_child + element.child_count;
-        let away = if distance > 0.0 { to / distance } else { element.normals.axis };
-        let near = element.radius > CLUSTER_FAR * distance;
-        if (near || self.exitant.misjudged.may_be(sender, away)) && !children.is_empty() {
-            let resolve = element.kind == Kind::Cluster || {
-                let [low, high] = self.exitant.range[sender as usize];
-                element.active || (high - low).max_element() > 0.1 * high.max_element()
-            };
-            if resolve {
-                return children.fold((Rgb::ZERO, 0.0), |(light, share), child| {
-                    let (more, also) = self.arriving_at(x, n, child, negligible);
-                    (light + more, share + also)
-                });
-            }
+        if let Some(parts) = self.parts_toward(x, sender) {
+            return parts.fold((Rgb::ZERO, 0.0), |(light, share), part| {
+                let (more, also) = self.arriving_at(x, n, part, negligible);
+                (light + more, share + also)
+            });
         }
         let factor = self.factor_at(x, n, sender);
         if factor <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
+        let away = self.away(x, sender);
         let light = match element.kind {
             Kind::Light => self.emitted(sender, away),
             _ => self.together(sender, away, self.directional_at(sender, (x, n), (factor, negligible))),
@@ -332,6 +325,27 @@ impl<L: LightField> Light<'_, L> {
             Kind::Front | Kind::Back => factor,
         };
         (light, share)
+    }
+
+    /// The parts by which a sender is taken at a point: where it is near, or misjudged as a whole, and its parts differ.
+    pub(crate) fn parts_toward(&self, x: Vec3, sender: u32) -> Option<std::ops::Range<u32>> {
+        let element = self.element(sender);
+        let distance = x.distance(element.center);
+        let near = element.radius > CLUSTER_FAR * distance;
+        let differ = || {
+            let [low, high] = self.exitant.range[sender as usize];
+            element.kind == Kind::Cluster || element.active || (high - low).max_element() > 0.1 * high.max_element()
+        };
+        let is_taken_so = element.child_count > 0
+            && (near || self.exitant.misjudged.may_be(sender, self.away(x, sender)))
+            && differ();
+        is_taken_so.then(|| element.first_child..element.first_child + element.child_count)
+    }
+
+    /// Unit direction from a sender's middle to a point.
+    fn away(&self, x: Vec3, sender: u32) -> Vec3 {
+        let element = self.element(sender);
+        (x - element.center).try_normalize().unwrap_or(element.normals.axis)
     }
 
     /// [`arriving_at`](Self::arriving_at) for a sender with extent that matters little, `to` the point from its middle.

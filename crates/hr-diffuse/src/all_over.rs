@@ -1,0 +1,82 @@
+//! What arrives all over a place: at several points of it at once.
+//!
+//! A large sender near by is taken by its parts, of which most are far from all of the place: those bring the same to each of its
+//! points, but for distance and cosine. So the hierarchy is walked once for all points, and each of them by itself asks only what is near it.
+
+use crate::hierarchy::{Element, Kind};
+use crate::hooks::LightField;
+use crate::transport::Light;
+use glam::Vec3;
+use smallvec::SmallVec;
+
+/// Places and senders whose radii together are below this share of their distance are far from each other.
+pub(crate) const FAR: f32 = 0.25;
+/// The middle of a place stands for all of it where it gets at least this share of the mean.
+const FACES: f32 = 0.5;
+
+/// Points of a place, their normals and weights (sum 1).
+pub(crate) type Points = SmallVec<[(Vec3, Vec3, f32); 8]>;
+
+/// A place, by its points.
+#[derive(Clone, Copy)]
+pub(crate) struct Spots<'a> {
+    pub(crate) points: &'a Points,
+    /// Its middle and the normal there, …
+    pub(crate) middle: (Vec3, Vec3),
+    /// … and the radius that holds it.
+    pub(crate) radius: f32,
+    /// As in [`Light::arriving_at`].
+    pub(crate) negligible: f32,
+}
+
+impl Spots<'_> {
+    /// Whether a sender is far from all of it.
+    pub(crate) fn is_far(&self, sender: &Element) -> bool {
+        let reach = self.radius + sender.radius;
+        reach * reach < FAR * FAR * sender.center.distance_squared(self.middle.0)
+    }
+
+    /// By point, what arrives from a sender (sum of channels) that brings so much to the middle, where it may stand for all of the place.
+    pub(crate) fn by_middle(&self, sender: &Element, value: f32) -> Option<SmallVec<[f32; 8]>> {
+        let kernel = |x: Vec3, n: Vec3| {
+            let to = sender.center - x;
+            to.dot(n).max(0.0) / (to.length_squared() * to.length()).max(f32::MIN_POSITIVE)
+        };
+        let mut kernels: SmallVec<[f32; 8]> = self.points.iter().map(|&(x, n, _)| kernel(x, n)).collect();
+        let mean: f32 = kernels.iter().zip(self.points).map(|(kernel, (.., weight))| kernel * weight).sum();
+        let in_middle = kernel(self.middle.0, self.middle.1);
+        // Where the middle hardly faces the sender it tells little of the rest.
+        (in_middle > FACES * mean).then(|| {
+            kernels.iter_mut().for_each(|kernel| *kernel *= value / in_middle);
+            kernels
+        })
+    }
+}
+
+impl<L: LightField> Light<'_, L> {
+    /// By point of a place, what arrives from a sender if it is wholly visible (sum of channels).
+    pub(crate) fn arriving_all_over(&self, spots: Spots<'_>, sender: u32) -> SmallVec<[f32; 8]> {
+        let mut arriving = SmallVec::from_elem(0.0, spots.points.len());
+        self.add_all_over(spots, sender, &mut arriving);
+        arriving
+    }
+
+    fn add_all_over(&self, spots: Spots<'_>, sender: u32, arriving: &mut [f32]) {
+        let element = self.element(sender);
+        if self.emitted_most(sender) <= 0.0 {
+            return;
+        }
+        let at = |x: Vec3, n: Vec3| self.arriving_at(x, n, sender, spots.negligible).0.element_sum();
+        if element.kind != Kind::Light && spots.is_far(element) {
+            let (x, n) = spots.middle;
+            if let Some(values) = spots.by_middle(element, at(x, n)) {
+                arriving.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+                return;
+            }
+        } else if let Some(parts) = self.parts_toward(spots.middle.0, sender) {
+            parts.for_each(|part| self.add_all_over(spots, part, arriving));
+            return;
+        }
+        arriving.iter_mut().zip(spots.points).for_each(|(sum, &(x, n, _))| *sum += at(x, n));
+    }
+}
