@@ -80,3 +80,47 @@ impl<L: LightField> Light<'_, L> {
         arriving.iter_mut().zip(spots.points).for_each(|(sum, &(x, n, _))| *sum += at(x, n));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::push::sample_points;
+    use crate::skips::Skips;
+    use crate::skips::tests::{room, solve};
+
+    /// All links of a room to parts of surfaces: at once, and point by point.
+    #[test]
+    fn what_arrives_all_over_arrives_at_each_point() {
+        let solver = solve(&room(), 0.1, (), Skips::ALL);
+        let light = solver.light();
+        let (mut far, mut off, mut all) = (0, 0.0, 0.0);
+        let to_patches = solver.links.all().iter().filter(|link| light.element(link.receiver).is_patch());
+        for link in to_patches {
+            let (receiver, sender) = (light.element(link.receiver), light.element(link.sender));
+            let points: Points = sample_points(light.scene, receiver).into_iter().collect();
+            let middle = (receiver.center, receiver.normals.axis);
+            let spots = Spots { points: &points, middle, radius: receiver.radius, negligible: 0.0 };
+            far += u32::from(spots.is_far(sender));
+            let at_once = light.arriving_all_over(spots, link.sender);
+            for (at_once, &(x, n, weight)) in at_once.into_iter().zip(&points) {
+                let by_point = light.arriving_at(x, n, link.sender, 0.0).0.element_sum();
+                off += weight * receiver.area * (at_once - by_point).abs();
+                all += weight * receiver.area * by_point;
+            }
+        }
+        assert!(far > 1000, "{far} senders are far");
+        assert!(off > 0.0 && off < 0.02 * all, "off by {} of the light", off / all);
+    }
+
+    /// Where the middle does not face a sender that others see, each point looks for itself.
+    #[test]
+    fn a_middle_that_sees_nothing_stands_for_no_one() {
+        let solver = solve(&room(), 0.3, (), Skips::ALL);
+        let sender = &solver.elements.nodes[0];
+        let above = sender.center + Vec3::Z * 100.0;
+        let points = Points::from_slice(&[(above, Vec3::NEG_Z, 0.5), (above, Vec3::Z, 0.5)]);
+        let spots = |normal: Vec3| Spots { points: &points, middle: (above, normal), radius: 1.0, negligible: 0.0 };
+        assert_eq!(spots(Vec3::NEG_Z).by_middle(sender, 3.0).as_deref(), Some([3.0, 0.0].as_slice()));
+        assert_eq!(spots(Vec3::Z).by_middle(sender, 0.0), None);
+    }
+}

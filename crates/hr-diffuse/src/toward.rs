@@ -228,4 +228,22 @@ mod tests {
         assert_eq!(light.directional_at(sender, (x, n), (1.0, 1.1)), single, "at most 1 is sent");
         assert!(light.is_wide(sender, x, 0.5) && !light.is_wide(sender, Vec3::splat(100.0), 0.5));
     }
+
+    /// A sender is negligible by what most directions get of it, not by a peak that few do; but not where the peak may be most of what there is.
+    #[test]
+    fn what_is_not_likely_to_matter_is_not_looked_at() {
+        // Radius²/distance² times the peak's radiosity is 1/8.
+        for (exponent, looked, taken_evenly) in [(40.0, 0.047, 0.048), (300.0, 0.0078, 0.0079)] {
+            let (mut solver, [sender, receiver]) = squares(0.0, Vec3::Z, exponent);
+            let mean = 2.0 / (exponent + 2.0);
+            solver.exitant.directional[sender as usize] = Rgb::splat(mean);
+            let light = solver.light();
+            let (x, n) = (light.element(receiver).center, light.element(receiver).normals.axis);
+            let with = |negligible: f32| light.arriving_at(x, n, sender, negligible);
+            assert_eq!(with(looked), with(0.0), "exponent {exponent}");
+            let (evenly, share) = with(taken_evenly);
+            assert_eq!(evenly, Rgb::splat(mean) * share, "exponent {exponent}");
+            assert_ne!(evenly, with(0.0).0, "exponent {exponent}");
+        }
+    }
 }
