@@ -361,8 +361,10 @@ impl Elements {
             cluster.facing = cluster.facing.scaled(cluster.area.recip());
             cluster.reflectance /= cluster.area;
         }
+        // Lights without extent have no normals, and shine anywhere.
+        let has_lights = self.nodes[range.clone()].iter().any(|child| child.kind == Kind::Light);
         if let Some(normals) = normals {
-            cluster.normals = normals;
+            cluster.normals = if has_lights { Cone::SPHERE } else { normals };
             cluster.bounds = [low, high];
             cluster.center = 0.5 * (low + high);
             cluster.radius = 0.5 * (high - low).length();

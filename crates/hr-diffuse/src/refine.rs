@@ -578,8 +578,7 @@ fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Toleranc
         let [_, diffuse] = light.diffuse_range(node);
         let brightest = diffuse.max_element() + DIRECTIONAL_SHARE * light.directional_most(node);
         let most = grazing(element, element);
-        // The root holds the lights without extent, too, which have no normals.
-        let is_smooth = tolerance.skips.averted && !tolerance.dark && node > 0 && most < 1.0;
+        let is_smooth = tolerance.skips.averted && !tolerance.dark && most < 1.0;
         return if is_smooth && weight * most * brightest <= tolerance.lost {
             Verdict::Facing
         } else {
