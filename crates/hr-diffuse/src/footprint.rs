@@ -14,6 +14,8 @@ use smallvec::SmallVec;
 
 /// Points of a footprint.
 const POINTS: u32 = 16;
+/// What is drawn out from a vertex that is covered is seen where so many of them are not.
+const OPEN: usize = POINTS as usize / 4;
 /// So much of the way to the ends of its triangles a footprint reaches: all of it would blur what leaves can show.
 const REACH: f32 = 0.6;
 
@@ -29,6 +31,11 @@ pub(crate) struct Footprint {
 }
 
 impl Footprint {
+    /// Whether a share of what the vertex is drawn out to that counts is open.
+    pub(crate) fn is_open(&self) -> bool {
+        self.spots.len() >= OPEN
+    }
+
     /// One of the points, the first after the last again; `None` where there are none.
     pub(crate) fn spot(&self, index: u32) -> Option<Spot> {
         self.spots.get(index as usize % self.spots.len().max(1)).copied()

@@ -40,6 +40,8 @@ const ALL_PROVED: f32 = 0.97;
 const COVER: f32 = 0.25;
 /// Vertices are changed by no more than this factor to agree with their leaves.
 const MOST_CHANGE: f64 = 1.5;
+/// Leaves whose shading normals let in less than this share of the light are not compared with vertices, which know how they lean.
+const UPRIGHT: f32 = 0.98;
 /// What near senders lean to changes the reflected light of a vertex by no more than this share.
 const MOST_LEAN: f32 = 0.5;
 /// Vertices that a thread gathers between two calls of `watch`: some milliseconds.
@@ -107,19 +109,26 @@ pub(crate) fn reconstruct<L: LightField>(
                 }
                 let (afar, seed) = (&from_afar[vertex], seed(vertices.positions[vertex]));
                 let spots = || footprint(light, (&vertices, vertex as u32), (COVER, seed));
-                let gather = |place: (u32, Vec2)| {
+                let gather = |place: (u32, Vec2), looks| {
                     let negligible = negligible(light.exitant.irradiance[place.0 as usize], error);
                     let inherited = (afar, near.of(place.0));
-                    gather_at(light, (links, &spreads, &shares), (place, negligible), inherited, (seed, &spots))
+                    gather_at(light, (links, &spreads, &shares), (place, negligible), inherited, (seed, &spots, looks))
                 };
-                let mut gathering = gather((vertices.leaf[vertex], places[vertex]));
+                let place = (vertices.leaf[vertex], places[vertex]);
+                let mut gathering = gather(place, Looks::FromVertex);
                 // What covers one of the leaves around need not cover another.
                 let mut others = contacts.places_around(&vertices, vertex as u32).into_iter();
+                let again = |gathering: Gathering, place, looks| {
+                    let other = gather(place, looks);
+                    Gathering { rays: gathering.rays + other.rays, ..other }
+                };
                 while gathering.covered
                     && let Some(place) = others.next()
                 {
-                    let other = gather(place);
-                    gathering = Gathering { rays: gathering.rays + other.rays, ..other };
+                    gathering = again(gathering, place, Looks::FromVertex);
+                }
+                if gathering.covered {
+                    gathering = again(gathering, place, Looks::FromFootprint);
                 }
                 gathering
             })
@@ -174,7 +183,9 @@ fn agree<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, seen: Seen
     let gathered: Vec<f32> = vertices.indirect.iter().map(|indirect| indirect.element_sum()).collect();
     let compared = |leaf: u32| {
         let element = light.element(leaf);
-        let counts = element.importance > 0.0 && light.elements.exposed(leaf) >= 1.0 && seen(NodeId(leaf));
+        let is_upright = || light.scene.let_in(element.source, &element.domain) > UPRIGHT;
+        let is_open = element.importance > 0.0 && light.elements.exposed(leaf) >= 1.0;
+        let counts = is_open && seen(NodeId(leaf)) && is_upright();
         let mean = vertices.mean(leaf, &gathered).filter(|&mean| counts && mean > 0.0);
         let sums = mean.map(|mean| {
             let weight = f64::from(element.area * element.importance);
@@ -233,7 +244,7 @@ fn gather_at<L: LightField>(
     (links, spreads, shares): (&Links, &[Spread], &[f32]),
     ((leaf, uv), negligible): ((u32, Vec2), f32),
     (inherited, near): (&[Brought; 3], &[u32]),
-    (seed, spots): (u32, &impl Fn() -> Footprint),
+    (seed, spots, looks): (u32, &impl Fn() -> Footprint, Looks),
 ) -> Gathering {
     let element = light.element(leaf);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv);
@@ -309,7 +320,9 @@ fn gather_at<L: LightField>(
         (row.limit(), false)
     } else {
         rays += rows::RAYS;
-        let seen = look_around(light, (x, n, element.source), seed, COVER * element.radius, is_own);
+        let open = footprint.filter(|footprint| looks == Looks::FromFootprint && footprint.is_open());
+        let spot = |i| open.as_ref().and_then(|footprint| footprint.spot(i)).unwrap_or((x, n, element.source));
+        let seen = look_around(light, spot, seed, COVER * element.radius, is_own);
         (row.correction(&seen), seen.covered)
     };
     let irradiance = own[0] + kept[0] + (own[1] + kept[1] + (own[2] + kept[2] * inherited) * rest) * all;
@@ -317,6 +330,15 @@ fn gather_at<L: LightField>(
     let indirect = (known[1] + others[1] + (known[2] + others[2] * inherited) * rest) * all;
     let sight = (!near_senders.is_empty()).then_some(Sight { at: x, normal: n, senders: near_senders, negligible });
     Gathering { irradiance, indirect, rays, covered, sight }
+}
+
+/// From where a vertex looks around.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Looks {
+    FromVertex,
+    /// From where the footprint is open. Of a rail along a table's edge a vertex may lie in the line in which both touch: rounding tells on
+    /// which side of the table it is.
+    FromFootprint,
 }
 
 /// Where the random numbers of a vertex begin: those of vertices in the same place, on both sides of a cut, are the same.
@@ -581,6 +603,67 @@ mod tests {
         let plate = Shape::Ring { center: DVec3::ZERO, normal: z, inner: 0.0, outer: 0.3 };
         let (off, leaves) = off_around(plate, lamp, 0.9);
         assert!(leaves <= 2 && off < 0.08, "{leaves} leaves: off by {off}");
+    }
+
+    /// However little of a room a rail is, it is dark below; what is too small to be seen is shown as it is.
+    #[test]
+    fn thin_rails_are_shown_in_parts() {
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let turns_of = |radius: f64| {
+            let rail = Shape::Cone { ends: [-0.25 * x, 0.25 * x], radii: [radius; 2] };
+            let ground = Shape::Quad([-x - y, x - y, x + y, y - x].map(|corner| corner * 20.0 - z));
+            let material = |exitance| DiffuseMaterial { reflectance: Rgb::splat(0.5), exitance, two_sided: false };
+            let input = SceneInput {
+                surfaces: vec![Surface::new(rail, 0), Surface::new(ground, 1)],
+                materials: vec![material(Rgb::ZERO), material(Rgb::ONE)],
+                ..SceneInput::default()
+            };
+            let mut solver = Solver::new(&input, Settings::with_error(0.5), ()).expect("a rail");
+            solver.solve(&mut |_| ControlFlow::Continue(()));
+            let vertices = solver.finish(&mut |_| ControlFlow::Continue(())).vertices;
+            let on_rail = |at: &usize| vertices.normals[*at].x.abs() < 0.5 && vertices.normals[*at].z < 0.99;
+            let turn = |at: usize| (vertices.normals[at].y.atan2(vertices.normals[at].z) * 100.0).round() as i32;
+            let turns: std::collections::BTreeSet<i32> =
+                (0..vertices.normals.len()).filter(on_rail).map(turn).collect();
+            turns.len()
+        };
+        let [thick, thin, tiny] = [0.03, 0.01, 0.001].map(turns_of);
+        assert!(thick >= 6 && thin >= 6 && tiny < 4, "they have {thick}, {thin} and {tiny} turns");
+    }
+
+    /// A rail along the edge of a table that hangs over it by next to nothing: where both touch the rail is as bright as beside that.
+    #[test]
+    fn rails_are_lit_where_they_touch_a_table() {
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let quad = |o: DVec3, a: DVec3, b: DVec3| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), 0);
+        let lamp = [-y - x, y - x, x + y, x - y].map(|corner| 0.25 * corner + 1.3 * z);
+        let material = |reflectance, exitance| DiffuseMaterial { reflectance, exitance, two_sided: true };
+        for height in [0.3, 0.7, 0.77, 0.9, 1.1] {
+            let rail = Shape::Cone { ends: [-0.5 * x + height * z, 0.5 * x + height * z], radii: [0.02; 2] };
+            let plate = |above: f64| quad(-0.5 * x - 1e-4 * y + (height + above) * z, x, y * 0.4);
+            let input = SceneInput {
+                surfaces: vec![
+                    Surface::new(rail, 0),
+                    plate(0.02 + 1e-6),
+                    plate(-0.02),
+                    Surface::new(Shape::Quad(lamp.map(|corner| corner + height * z)), 1),
+                ],
+                materials: vec![material(Rgb::splat(0.5), Rgb::ZERO), material(Rgb::ZERO, Rgb::ONE)],
+                ..SceneInput::default()
+            };
+            let mut solver = Solver::new(&input, Settings::with_error(0.2), ()).expect("a table");
+            solver.solve(&mut |_| ControlFlow::Continue(()));
+            let solution = solver.finish(&mut |_| ControlFlow::Continue(()));
+            let vertices = &solution.vertices;
+            let above = |&at: &usize| {
+                let on_rail = solution.elements.nodes[vertices.leaf[at] as usize].source == 0;
+                on_rail && vertices.normals[at].z > 0.999
+            };
+            let along: Vec<f32> =
+                (0..vertices.positions.len()).filter(above).map(|at| vertices.irradiance[at].x).collect();
+            let [least, most] = [f32::min, f32::max].map(|of| along.iter().copied().reduce(of).expect("some vertex"));
+            assert!(least > 0.6 * most, "from {least} to {most} along the rail at {height}");
+        }
     }
 
     /// A wall sees mostly what is next to it of a floor, which is dark there and bright below a lamp farther on.

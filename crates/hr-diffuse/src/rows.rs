@@ -5,12 +5,13 @@
 //! enclosure that is all of it, without noise. So no light is lost or made on the way.
 
 use crate::exposed::is_dark;
+use crate::footprint::Spot;
 use crate::gather::Group;
 use crate::hooks::LightField;
 use crate::sampling::{cosine_direction, hash, point2};
 use crate::transport::Light;
 use crate::visibility::Hit;
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 
 /// Sides of the grid of directions that is drawn from at each point.
 const GRID: u32 = 7;
@@ -35,11 +36,11 @@ pub(crate) struct Seen {
     pub(crate) covered: bool,
 }
 
-/// Looks around from `x` on a surface, with the unit normal `n`. `own` tells which senders count as the place's own. What is
+/// Looks around from a place, one ray from each of its `spots` in turn. `own` tells which senders count as the place's own. What is
 /// nearer than `near` may cover it.
 pub(crate) fn look_around<L: LightField>(
     light: Light<'_, L>,
-    (x, n, surface): (Vec3, Vec3, u32),
+    spots: impl Fn(u32) -> Spot,
     seed: u32,
     near: f32,
     own: impl Fn(u32) -> bool,
@@ -48,6 +49,7 @@ pub(crate) fn look_around<L: LightField>(
     for cell in 0..RAYS {
         let jitter = point2(hash(seed, 0x2f1b), cell);
         let u = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + jitter) / GRID as f32;
+        let (x, n, surface) = spots(cell);
         let direction = cosine_direction(n, u.x, u.y);
         let Some(hit) = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface) else { continue };
         let side = 2 * hit.surface + u32::from(!hit.front);

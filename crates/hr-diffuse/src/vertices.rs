@@ -17,8 +17,12 @@ const MOST_TURN: f32 = 0.6;
 /// … and so are those, flat or not, that go around their axis by more than this share of a full turn: of a disk, corners are but
 /// its centre and one point of its rim, …
 const MOST_AROUND: f32 = 0.25;
-/// … unless they are smaller than this share of all area: a part takes as long as a leaf.
+/// … unless they are smaller than this share of all area: a part takes as long as a leaf. Where so small ones turn by more than an angle,
+/// as halves of a rail do, they are still shown in parts, down to …
 const SMALL: f32 = 3e-5;
+const MUCH_TURN: f32 = 1.2;
+/// … a tenth of that.
+const TINY: f32 = 3e-6;
 /// Most finer levels that a neighbour may have.
 const EDGE_DEPTH: u32 = 14;
 
@@ -212,10 +216,18 @@ fn layout(scene: &SceneData, elements: &Elements, parts_of: impl Fn(u32) -> Smal
 fn turns(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Domain; 8]> {
     let element = &elements.nodes[leaf as usize];
     let geometry = &scene.surfaces()[element.source as usize];
-    let is_whole = element.importance <= 0.0 || element.area < SMALL * elements.measure();
+    let [is_small, is_tiny] = [SMALL, TINY].map(|share| element.area < share * elements.measure());
     let turns = |domain: Domain| {
-        !is_whole && (geometry.normal_cone(domain).angle() > MOST_TURN || geometry.around(domain) > MOST_AROUND)
+        let angle = geometry.normal_cone(domain).angle();
+        if is_small {
+            !is_tiny && angle > MUCH_TURN
+        } else {
+            angle > MOST_TURN || geometry.around(domain) > MOST_AROUND
+        }
     };
+    if element.importance <= 0.0 {
+        return smallvec![element.domain];
+    }
     let mut parts = SmallVec::<[Domain; 8]>::new();
     let mut open: SmallVec<[Domain; 8]> = smallvec![element.domain];
     while let Some(domain) = open.pop() {

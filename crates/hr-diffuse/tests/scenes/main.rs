@@ -13,6 +13,7 @@ mod fixtures;
 mod rearrange;
 mod relight;
 mod resume;
+mod shading;
 mod shadows;
 mod shooting;
 mod windows;
