@@ -179,7 +179,7 @@ fn contacts(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Cont
     scene.visibility.any_in(&region, |other| {
         let surface = &scene.surfaces()[other as usize];
         if other != element.source
-            && let Some(contact) = contact(surface, geometry, normal)
+            && let Some(contact) = contact(surface, geometry, (normal, ON * element.radius))
             && let Some(line) = section(surface, normal, height + gap)
             && length_within(line, (&outline, contact.beside), normal, element) > LONG * element.radius
         {
@@ -202,16 +202,16 @@ fn contacts(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Cont
     contacts
 }
 
-/// The plane of a polygon that is not parallel to one with a normal, which may lie beside it, as walls beside floors do.
-fn contact(surface: &Geometry, geometry: &Geometry, normal: Vec3) -> Option<Contact> {
+/// The plane of a polygon that is not parallel to one with a normal, which may lie beside it, as walls beside floors do: no more than
+/// `near` of that is beyond.
+fn contact(surface: &Geometry, geometry: &Geometry, (normal, near): (Vec3, f32)) -> Option<Contact> {
     let plane = surface.is_polygon().then(|| outward(surface, 0))?;
     let [low, high] = geometry.heights(plane)?;
     let height = surface.point(Vec2::ZERO).dot(plane);
-    let beside = ON * (high - low);
     if plane.dot(normal).abs() > PARALLEL {
         return None;
     }
-    let beside = low > height - beside || high < height + beside;
+    let beside = low > height - near || high < height + near;
     let sign = plane.to_array().into_iter().find(|c| c.abs() > 1e-3).map_or(1.0, f32::signum);
     Some(Contact { normal: plane * sign, height: height * sign, beside })
 }

@@ -38,8 +38,8 @@ const ALIKE: f32 = 0.05;
 const BAND: usize = 8;
 /// Where the standard error of a pixel is larger than this share of its light, there are as many more rays for a print as would
 /// make it that small, up to so many times as many. Its neighbours have as many, as some do not know how noisy they are.
-const NOISE: f32 = 0.06;
-const NOISE_ROUNDS: u8 = 3;
+const NOISE: f32 = 0.04;
+const NOISE_ROUNDS: u8 = 8;
 /// Paths of a final gather, for every ray of the other modes, then as many more as make a power of two, which are spread best. With
 /// the grid of stills 64 per pixel, 4096 per 8 × 8 block: noise of a block's mean is 1 % where many lamps light rough and
 /// polished metal, else less.
