@@ -216,18 +216,13 @@ fn layout(scene: &SceneData, elements: &Elements, parts_of: impl Fn(u32) -> Smal
 fn turns(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Domain; 8]> {
     let element = &elements.nodes[leaf as usize];
     let geometry = &scene.surfaces()[element.source as usize];
-    let [is_small, is_tiny] = [SMALL, TINY].map(|share| element.area < share * elements.measure());
-    let turns = |domain: Domain| {
-        let angle = geometry.normal_cone(domain).angle();
-        if is_small {
-            !is_tiny && angle > MUCH_TURN
-        } else {
-            angle > MOST_TURN || geometry.around(domain) > MOST_AROUND
-        }
-    };
-    if element.importance <= 0.0 {
+    let share = element.area / elements.measure();
+    if element.importance <= 0.0 || share < TINY {
         return smallvec![element.domain];
     }
+    let [most_turn, most_around] = if share < SMALL { [MUCH_TURN, f32::INFINITY] } else { [MOST_TURN, MOST_AROUND] };
+    let turns =
+        |domain: Domain| geometry.normal_cone(domain).angle() > most_turn || geometry.around(domain) > most_around;
     let mut parts = SmallVec::<[Domain; 8]>::new();
     let mut open: SmallVec<[Domain; 8]> = smallvec![element.domain];
     while let Some(domain) = open.pop() {
