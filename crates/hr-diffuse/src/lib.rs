@@ -33,6 +33,7 @@ pub mod form_factor;
 mod gather;
 pub mod geometry;
 mod grazing;
+mod hidden;
 pub mod hierarchy;
 pub mod hooks;
 mod inherited;

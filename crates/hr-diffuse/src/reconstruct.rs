@@ -7,6 +7,7 @@ use crate::calibrate::{OF_VERTICES, Sums, factors};
 use crate::contacts::Contacts;
 use crate::footprint::{Footprint, footprint};
 use crate::gather::{Group, carried, share};
+use crate::hidden::Hidden;
 use crate::hooks::LightField;
 use crate::inherited::{Above, inherit};
 use crate::leaning::{Leaning, Sight, is_near};
@@ -24,6 +25,7 @@ use crate::within::Within;
 use crate::{Facing, NodeId, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
+use std::cell::LazyCell;
 use std::ops::{AddAssign, ControlFlow, Mul};
 
 /// Rays for a link that carries all of a vertex's light; others in proportion.
@@ -34,6 +36,8 @@ const MOST_RAYS: f32 = 24.0;
 /// that looked wholly visible or hidden.
 const PARTIAL_SHARE: f32 = 0.002;
 const WHOLE_SHARE: f32 = 0.01;
+/// Of these rays, those for what none of the leaves around sees.
+const HIDDEN_SHARE: f32 = 0.25;
 /// Where it is proved how much is seen of senders that take up this share of the view there is nothing to look around for.
 const ALL_PROVED: f32 = 0.97;
 /// What is nearer to a vertex than this share of its leaf's radius, all around, covers it.
@@ -109,10 +113,13 @@ pub(crate) fn reconstruct<L: LightField>(
                 }
                 let (afar, seed) = (&from_afar[vertex], seed(vertices.positions[vertex]));
                 let spots = || footprint(light, (&vertices, vertex as u32), (COVER, seed));
+                let hidden = LazyCell::new(|| Hidden::from_all(light, links, around));
                 let gather = |place: (u32, Vec2), looks| {
                     let negligible = negligible(light.exitant.irradiance[place.0 as usize], error);
                     let inherited = (afar, near.of(place.0));
-                    gather_at(light, (links, &spreads, &shares), (place, negligible), inherited, (seed, &spots, looks))
+                    let from = (seed, &spots, looks);
+                    let place = (place, negligible);
+                    gather_at(light, (links, &spreads, &shares), place, inherited, from, |sender| hidden.holds(sender))
                 };
                 let place = (vertices.leaf[vertex], places[vertex]);
                 let mut gathering = gather(place, Looks::FromVertex);
@@ -238,13 +245,14 @@ fn uncover(vertices: &mut Vertices, covered: &[bool], is_seen: &[bool]) {
 }
 
 /// Irradiance at a point of a leaf, gathered over all links that light it, but roughly from senders that bring less than is `negligible`; how much is seen of their senders from all over a footprint,
-/// which is asked for where that has to be found out.
+/// which is asked for where that has to be found out, and with fewer rays of what `is_hidden` from all around.
 fn gather_at<L: LightField>(
     light: Light<'_, L>,
     (links, spreads, shares): (&Links, &[Spread], &[f32]),
     ((leaf, uv), negligible): ((u32, Vec2), f32),
     (inherited, near): (&[Brought; 3], &[u32]),
     (seed, spots, looks): (u32, &impl Fn() -> Footprint, Looks),
+    is_hidden: impl Fn(u32) -> bool,
 ) -> Gathering {
     let element = light.element(leaf);
     let (x, n) = point_on(light.scene, light.elements, leaf, uv);
@@ -296,7 +304,8 @@ fn gather_at<L: LightField>(
                 found
             });
             let from = |i: u32| spots.spot(known_here.len() as u32 + i).unwrap_or((x, n, element.source));
-            let count = (share * RAYS).clamp(1.0, MOST_RAYS) as u32;
+            let rarer = if visibility == 0.0 && is_hidden(sender) { HIDDEN_SHARE } else { 1.0 };
+            let count = ((share * RAYS).min(MOST_RAYS) * rarer).max(1.0) as u32;
             rays += count;
             visibility = visibility_at(light, from, sender, (count, seed));
         }
