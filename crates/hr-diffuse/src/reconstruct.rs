@@ -70,7 +70,7 @@ pub(crate) fn reconstruct<L: LightField>(
     (error, seen): (f32, Seen<'_>),
     watch: &mut dyn FnMut(f32) -> ControlFlow<()>,
 ) -> (Vertices, Cost) {
-    let mut layout = outlines_of_parts(light.scene, light.elements);
+    let mut layout = outlines_of_parts(light.scene, light.elements, (&light.exitant.irradiance, error));
     let contacts = Contacts::new(light.scene, light.elements, &layout);
     contacts.cut(light.elements, &mut layout);
     let mut vertices = layout.fans(light.scene, light.elements);
@@ -612,6 +612,47 @@ mod tests {
         let plate = Shape::Ring { center: DVec3::ZERO, normal: z, inner: 0.0, outer: 0.3 };
         let (off, leaves) = off_around(plate, lamp, 0.9);
         assert!(leaves <= 2 && off < 0.08, "{leaves} leaves: off by {off}");
+    }
+
+    /// Along the straight edge of a shadow light is the same everywhere: no teeth.
+    #[test]
+    fn edges_of_shadows_are_straight() {
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let plate = |from: DVec3, to: DVec3| {
+            let [a, b] = [DVec3::new(to.x, from.y, from.z), DVec3::new(from.x, to.y, from.z)];
+            Shape::Quad([from, a, to, b])
+        };
+        let lamp = [-x - y, y - x, x + y, x - y].map(|corner| 0.01 * corner + 3.0 * z);
+        let material = |reflectance, exitance| DiffuseMaterial { reflectance, exitance, two_sided: true };
+        for edge in [0.3, 0.32, 0.34, 0.36, 0.38] {
+            let input = SceneInput {
+                surfaces: vec![
+                    Surface::new(plate(-x - y, x + y), 0),
+                    Surface::new(plate(-3.0 * x - 3.0 * y + z, 3.0 * x + edge * y + z), 0),
+                    Surface::new(Shape::Quad(lamp), 1),
+                ],
+                materials: vec![material(Rgb::splat(0.5), Rgb::ZERO), material(Rgb::ZERO, Rgb::ONE)],
+                ..SceneInput::default()
+            };
+            let mut solver = Solver::new(&input, Settings::with_error(0.1), ()).expect("a plate above a floor");
+            solver.solve(&mut |_| ControlFlow::Continue(()));
+            let solution = solver.finish(&mut |_| ControlFlow::Continue(()));
+            let along = |v: f32| {
+                let at = |k: u16| {
+                    let uv = Vec2::new(0.3 + 0.4 * f32::from(k) / 100.0, v);
+                    let leaf = solution.elements.leaf_at(&solution.scene, 0, false, uv).expect("it reflects");
+                    (solution.irradiance(leaf, uv) - solution.indirect_irradiance(leaf, uv)).x
+                };
+                let light: Vec<f32> = (0..100).map(at).collect();
+                let mean = light.iter().sum::<f32>() / 100.0;
+                (mean, light.iter().map(|light| (light - mean).abs()).sum::<f32>() / 100.0)
+            };
+            let lines: Vec<(f32, f32)> = (0..80).map(|k| along(0.65 + 0.3 * f32::from(k as u8) / 80.0)).collect();
+            let most = lines.iter().map(|line| line.0).fold(0.0, f32::max);
+            let off = lines.iter().map(|line| line.1).fold(0.0, f32::max);
+            assert!(lines.iter().any(|line| line.0 < 0.1 * most), "it is dark below the plate");
+            assert!(off < 0.055 * most, "along some line light differs by {off} of {most}");
+        }
     }
 
     /// However little of a room a rail is, it is dark below; what is too small to be seen is shown as it is.

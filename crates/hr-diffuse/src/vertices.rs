@@ -2,7 +2,7 @@
 //! neighbours put on its edges, so that no crack opens where elements of different size meet. Where other surfaces stand on a
 //! leaf it is cut, and shown as several fans (`contacts.rs`); so is one that goes far around a curved surface or a disk.
 
-use crate::hierarchy::{Elements, Kind, SceneData};
+use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::{Domain, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::{SmallVec, smallvec};
@@ -23,6 +23,9 @@ const SMALL: f32 = 3e-5;
 const MUCH_TURN: f32 = 1.2;
 /// … a tenth of that.
 const TINY: f32 = 3e-6;
+/// Where irradiances of leaves around a corner differ by more than this many times the error, in shares of the largest, leaves have
+/// vertices in the middles of their edges, too.
+const CHANGE: f32 = 1.25;
 /// Most finer levels that a neighbour may have.
 const EDGE_DEPTH: u32 = 14;
 
@@ -162,54 +165,120 @@ pub(crate) struct Layout {
 
 /// Finds the corners of all leaves, and the outlines through them.
 pub(crate) fn outlines(scene: &SceneData, elements: &Elements) -> Layout {
-    layout(scene, elements, |leaf| smallvec![elements.nodes[leaf as usize].domain])
+    let leaves = elements.patch_leaves().map(|leaf| (leaf, elements.nodes[leaf as usize].domain)).collect();
+    Corners::new(scene, elements, leaves).outlines()
 }
 
-/// The same for display: of leaves that turn, parts of them.
-pub(crate) fn outlines_of_parts(scene: &SceneData, elements: &Elements) -> Layout {
-    layout(scene, elements, |leaf| turns(scene, elements, leaf))
+/// The same for display to an error: of leaves that turn, parts of them; and vertices on edges where the irradiance, by node, changes
+/// from a leaf to the next.
+pub(crate) fn outlines_of_parts(scene: &SceneData, elements: &Elements, (irradiance, error): (&[Rgb], f32)) -> Layout {
+    let parts_of = |leaf| turns(scene, elements, leaf).into_iter().map(move |part| (leaf, part));
+    let mut corners = Corners::new(scene, elements, elements.patch_leaves().flat_map(parts_of).collect());
+    corners.halve_edges(irradiance, CHANGE * error);
+    corners.outlines()
 }
 
-/// Finds the corners of leaves or their parts, and the outlines through them.
-fn layout(scene: &SceneData, elements: &Elements, parts_of: impl Fn(u32) -> SmallVec<[Domain; 8]>) -> Layout {
-    let mut vertices = Vertices::default();
-    let mut index: HashMap<Key, u32> = HashMap::new();
-    let domains = || elements.patch_leaves().flat_map(|leaf| parts_of(leaf).into_iter().map(move |part| (leaf, part)));
-    for (leaf, domain) in domains() {
-        let element = &elements.nodes[leaf as usize];
-        for uv in scene.surfaces()[element.source as usize].corners(domain) {
-            let (position, normal) = point_on(scene, elements, leaf, uv);
-            let next = vertices.positions.len() as u32;
-            let vertex = *index.entry(key(position, normal, element.material)).or_insert(next);
-            if vertex == next {
-                vertices.add((position, normal), leaf, uv);
-            } else {
-                vertices.of_smallest(elements, vertex, leaf, uv);
+/// The corners of leaves, or of their parts.
+struct Corners<'a> {
+    scene: &'a SceneData,
+    elements: &'a Elements,
+    parts: Vec<(u32, Domain)>,
+    vertices: Vertices,
+    index: HashMap<Key, u32>,
+}
+
+impl<'a> Corners<'a> {
+    fn new(scene: &'a SceneData, elements: &'a Elements, parts: Vec<(u32, Domain)>) -> Self {
+        let mut corners = Self { scene, elements, parts, vertices: Vertices::default(), index: HashMap::new() };
+        for part in 0..corners.parts.len() {
+            let (leaf, around) = corners.around(part);
+            around.into_iter().for_each(|uv| corners.add(leaf, uv));
+        }
+        corners
+    }
+
+    /// The leaf of a part, and its corners.
+    fn around(&self, part: usize) -> (u32, SmallVec<[Vec2; 4]>) {
+        let (leaf, domain) = self.parts[part];
+        let surface = self.elements.nodes[leaf as usize].source;
+        (leaf, self.scene.surfaces()[surface as usize].corners(domain))
+    }
+
+    fn key(&self, leaf: u32, uv: Vec2) -> (Key, (Vec3, Vec3)) {
+        let (position, normal) = point_on(self.scene, self.elements, leaf, uv);
+        (key(position, normal, self.elements.nodes[leaf as usize].material), (position, normal))
+    }
+
+    /// The vertex at a point of a leaf.
+    fn at(&self, leaf: u32, uv: Vec2) -> Option<u32> {
+        self.index.get(&self.key(leaf, uv).0).copied()
+    }
+
+    /// Makes one there, if there is none.
+    fn add(&mut self, leaf: u32, uv: Vec2) {
+        let (key, point) = self.key(leaf, uv);
+        let next = self.vertices.positions.len() as u32;
+        let vertex = *self.index.entry(key).or_insert(next);
+        if vertex == next {
+            self.vertices.add(point, leaf, uv);
+        } else {
+            self.vertices.of_smallest(self.elements, vertex, leaf, uv);
+        }
+    }
+
+    /// Adds the middles of all edges of leaves that have a corner around which irradiances differ by more than a share of the largest.
+    /// Where the edge of a shadow runs through a row of leaves, their middles may be lit and their corners dark, or the other way round: by
+    /// both alone it would be shown as a row of teeth.
+    fn halve_edges(&mut self, irradiance: &[Rgb], share: f32) {
+        let counts = |element: &Element| element.importance > 0.0 && element.area > TINY * self.elements.measure();
+        let mut edges: Vec<(u32, SmallVec<[Vec2; 4]>)> = Vec::new();
+        let mut ranges = vec![(f32::MAX, 0.0_f32); self.vertices.positions.len()];
+        for part in 0..self.parts.len() {
+            let (leaf, around) = self.around(part);
+            if self.elements.nodes[leaf as usize].importance > 0.0 {
+                let light = irradiance[leaf as usize].element_sum();
+                for vertex in around.iter().filter_map(|&uv| self.at(leaf, uv)) {
+                    let (low, high) = &mut ranges[vertex as usize];
+                    (*low, *high) = (low.min(light), high.max(light));
+                }
+            }
+        }
+        let changes = |(low, high): (f32, f32)| high - low > share * high;
+        for part in 0..self.parts.len() {
+            let (leaf, around) = self.around(part);
+            let mut vertices = around.iter().filter_map(|&uv| self.at(leaf, uv));
+            if counts(&self.elements.nodes[leaf as usize]) && vertices.any(|vertex| changes(ranges[vertex as usize])) {
+                edges.push((leaf, around));
+            }
+        }
+        for (leaf, around) in edges {
+            for (i, &a) in around.iter().enumerate() {
+                self.add(leaf, 0.5 * (a + around[(i + 1) % around.len()]));
             }
         }
     }
-    let mut parts = Vec::new();
-    for (leaf, domain) in domains() {
-        let element = &elements.nodes[leaf as usize];
-        let corners = scene.surfaces()[element.source as usize].corners(domain);
-        let at = |uv: Vec2| {
-            let (position, normal) = point_on(scene, elements, leaf, uv);
-            index.get(&key(position, normal, element.material)).copied()
+
+    /// The outlines of all parts through what is on their edges.
+    fn outlines(self) -> Layout {
+        let outline = |part: usize| {
+            let (leaf, corners) = self.around(part);
+            let at = |uv: Vec2| self.at(leaf, uv);
+            let mut outline = Outline::new();
+            for (i, &a) in corners.iter().enumerate() {
+                let b = corners[(i + 1) % corners.len()];
+                // An edge that is one point, such as a pole, has no inner vertices.
+                let ends = [at(a), at(b)];
+                if let Some(vertex) = ends[0] {
+                    outline.push(Corner { vertex, uv: a });
+                }
+                let find = |uv: Vec2| at(uv).filter(|vertex| !ends.contains(&Some(*vertex)));
+                along_edge(a, b, EDGE_DEPTH, &find, &mut outline);
+            }
+            (leaf, outline)
         };
-        let mut outline = Outline::new();
-        for (i, &a) in corners.iter().enumerate() {
-            let b = corners[(i + 1) % corners.len()];
-            // An edge that is one point, such as a pole, has no inner vertices.
-            let ends = [at(a), at(b)];
-            if let Some(vertex) = ends[0] {
-                outline.push(Corner { vertex, uv: a });
-            }
-            let find = |uv: Vec2| at(uv).filter(|vertex| !ends.contains(&Some(*vertex)));
-            along_edge(a, b, EDGE_DEPTH, &find, &mut outline);
-        }
-        parts.push((leaf, outline));
+        let parts = (0..self.parts.len()).map(outline).collect();
+        Layout { vertices: self.vertices, parts }
     }
-    Layout { vertices, parts }
 }
 
 /// Parts of a leaf whose normals differ little and which do not go far around; the leaf itself, where it is such, small or black.
