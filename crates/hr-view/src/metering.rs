@@ -9,7 +9,7 @@ use crate::solved::Solved;
 use hr_scene::{Camera, Rgb, ToneMap};
 
 /// Width of the small pictures.
-const WIDTH: u32 = 64;
+const WIDTH: u32 = 80;
 
 /// What radiance is multiplied by in pictures that some cameras take of a solution, and that are to be exposed alike; `None` where they
 /// see no light at all.
