@@ -1,6 +1,7 @@
 //! Vertices for display: every leaf is shown as a fan about its middle, through its corners and through the corners that finer
 //! neighbours put on its edges, so that no crack opens where elements of different size meet. Where other surfaces stand on a
 //! leaf it is cut, and shown as several fans (`contacts.rs`); so is one that goes far around a curved surface or a disk.
+//! Where light changes from a leaf to the next, edges have vertices in their middles, too.
 
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::{Domain, Rgb};
