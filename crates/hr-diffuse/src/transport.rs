@@ -23,6 +23,9 @@ const LIKELY: f32 = 8.0;
 /// … but a peak that would bring more than so many times what is negligible may be all that a place sees.
 const UNLIKELY: f32 = 16.0;
 
+/// Parts of surfaces that matter little and whose radius is below this share of their distance are taken for points.
+const POINT: f32 = 0.15;
+
 /// Exitant diffuse light per node.
 #[derive(Clone, Debug, Default)]
 pub struct Exitant {
@@ -296,11 +299,10 @@ impl<L: LightField> Light<'_, L> {
         if most <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
-        let to = x - element.center;
-        let distance2 = to.length_squared();
-        let likely = most.min(self.likely_most(sender).max(most / UNLIKELY));
-        if element.kind != Kind::Light && likely * element.radius * element.radius < negligible * distance2 {
-            return self.weakly_arriving_at(to, n, sender);
+        if element.kind != Kind::Light
+            && let Some(weakly) = self.weakly_arriving_at((x, n), sender, most, negligible)
+        {
+            return weakly;
         }
         if let Some(parts) = self.parts_toward(x, sender) {
             return parts.fold((Rgb::ZERO, 0.0), |(light, share), part| {
@@ -348,15 +350,31 @@ impl<L: LightField> Light<'_, L> {
         (x - element.center).try_normalize().unwrap_or(element.normals.axis)
     }
 
-    /// [`arriving_at`](Self::arriving_at) for a sender with extent that matters little, `to` the point from its middle.
-    fn weakly_arriving_at(&self, to: Vec3, n: Vec3, sender: u32) -> (Rgb, f32) {
+    /// [`arriving_at`](Self::arriving_at) for a sender with extent that emits no more than `most`, if it matters little there: one that is
+    /// below the horizon, or brings no more than is `negligible`.
+    fn weakly_arriving_at(&self, (x, n): (Vec3, Vec3), sender: u32, most: f32, negligible: f32) -> Option<(Rgb, f32)> {
         let element = self.element(sender);
-        let distance2 = to.length_squared();
-        let away = to / distance2.sqrt();
-        let factor = (-away.dot(n)).max(0.0) * afar(element.area, distance2);
-        let share = factor * element.mean_cosine(away);
-        let even = self.exitant.radiosity[sender as usize] + self.exitant.directional[sender as usize];
-        (even * share, share)
+        let to = x - element.center;
+        if to.dot(n) >= element.radius {
+            return Some((Rgb::ZERO, 0.0));
+        }
+        let (radius2, distance2) = (element.radius * element.radius, to.length_squared());
+        let likely = most.min(self.likely_most(sender).max(most / UNLIKELY));
+        let is_weak = likely * radius2 < negligible * distance2;
+        if !is_weak && radius2 > CLUSTER_FAR * CLUSTER_FAR * distance2 {
+            return None;
+        }
+        let distance = distance2.sqrt();
+        let away = to / distance;
+        let cosines = [-away.dot(n), element.mean_cosine(away)].map(|cosine| cosine.max(0.0));
+        let (size, around) = (afar(element.area, distance2), element.radius / distance);
+        let at_most = most * size * (cosines[0] + around) * (cosines[1] + around);
+        (is_weak || at_most < negligible).then(|| {
+            let is_point = is_weak || element.kind == Kind::Cluster || around < POINT;
+            let share = if is_point { size * cosines[0] * cosines[1] } else { self.factor_at(x, n, sender) };
+            let even = self.exitant.radiosity[sender as usize] + self.exitant.directional[sender as usize];
+            (even * share, share)
+        })
     }
 
     /// Unit direction from `x` toward a sender; for distant light against its direction.
@@ -442,6 +460,40 @@ mod tests {
         let lamp = DiffuseMaterial { reflectance: Rgb::ZERO, exitance: Rgb::ONE, two_sided: false };
         let input = SceneInput { surfaces, materials: vec![wall, lamp], ..SceneInput::default() };
         Solver::new(&input, Settings::with_error(error), ()).expect("the scene is sound")
+    }
+
+    /// Of senders that are taken roughly no more is missing than is negligible, be they known by their radii or their cosines.
+    #[test]
+    fn what_is_negligible_is_told_to_within_that() {
+        use crate::skips::Skips;
+        use crate::skips::tests::{room, solve};
+        let solver = solve(&room(), 0.1, (), Skips::ALL);
+        let light = solver.light();
+        let (mut below, mut by_radius, mut by_cosines) = (0, 0, 0);
+        for receiver in solver.elements.patch_leaves().map(|leaf| light.element(leaf)).filter(|leaf| leaf.is_flat()) {
+            let (x, n) = (receiver.center, receiver.normals.axis);
+            for (sender, element) in solver.elements.nodes.iter().enumerate().filter(|(_, e)| e.kind != Kind::Light) {
+                let exact = light.irradiance_at(x, n, sender as u32);
+                let most = light.emitted_most(sender as u32);
+                for negligible in [0.003, 0.03].map(|share| share * solver.exitant.irradiance[0].max_element()) {
+                    let Some((weakly, _)) = light.weakly_arriving_at((x, n), sender as u32, most, negligible) else {
+                        continue;
+                    };
+                    let off = (weakly - exact).abs().max_element();
+                    assert!(off <= negligible, "{weakly}, not {exact}, where {negligible} is negligible");
+                    let apart2 = x.distance_squared(element.center);
+                    if (element.center - x).dot(n) <= -element.radius {
+                        assert_eq!(exact, Rgb::ZERO, "it is below the horizon");
+                        below += 1;
+                    } else if most * element.radius * element.radius < negligible * apart2 {
+                        by_radius += 1;
+                    } else {
+                        by_cosines += 1;
+                    }
+                }
+            }
+        }
+        assert!(below > 100 && by_radius > 1000 && by_cosines > 1000, "{below}, {by_radius}, {by_cosines}");
     }
 
     /// Lamps that are flat boxes, cubes and balls of triangles, far enough to be taken as wholes, against the sum of closed forms over their faces.
