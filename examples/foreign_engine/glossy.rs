@@ -108,6 +108,8 @@ fn reflect(field: &Field, patches: &[Patch], at: usize, samples: &Incident, irra
     }
     // Diffuse light is the engine's own.
     let diffuse = Vec3::ZERO;
-    let arrived = Arrived { irradiance, diffuse, spread: bend, negligible: 0.0, error: ERROR, shown };
+    // Beside what white paint would make of the same light.
+    let negligible = ERROR * irradiance.max_element() / PI;
+    let arrived = Arrived { irradiance, diffuse, spread: bend, negligible, error: ERROR, shown };
     field.reflect(&Leaves(patches), NodeId(at as u32), &[samples], arrived)
 }
