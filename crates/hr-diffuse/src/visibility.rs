@@ -117,18 +117,22 @@ impl HalfSpace {
         }
     }
 
+    /// The least heights of a node's boxes.
+    #[inline]
+    fn least(&self, bounds: &[Vec4; 6]) -> Vec4 {
+        let ([a, b, c], [x, y, z]) = (self.normal, self.lowest);
+        a * bounds[x] + b * bounds[y] + c * bounds[z]
+    }
+
     /// Which of a node's boxes reach into it.
     #[inline]
     fn meets(&self, bounds: &[Vec4; 6]) -> BVec4A {
-        let ([a, b, c], [x, y, z]) = (self.normal, self.lowest);
-        (a * bounds[x] + b * bounds[y] + c * bounds[z]).cmple(self.height)
+        self.least(bounds).cmple(self.height)
     }
 }
 
 /// A ray with what slab tests need.
 struct Ray {
-    origin: Vec3,
-    direction: Vec3,
     origins: [Vec4; 3],
     reciprocals: [Vec4; 3],
     /// Index of the near bound in [`Node::bounds`], by axis.
@@ -140,8 +144,6 @@ impl Ray {
         let reciprocal = direction.map(|d| if d.abs() < PARALLEL { PARALLEL.copysign(d) } else { d }.recip());
         let axis = |i: usize| 2 * i + usize::from(reciprocal[i] < 0.0);
         Self {
-            origin,
-            direction,
             origins: [0, 1, 2].map(|i| Vec4::splat(origin[i])),
             reciprocals: [0, 1, 2].map(|i| Vec4::splat(reciprocal[i])),
             near: [axis(0), axis(1), axis(2)],
@@ -319,10 +321,22 @@ impl Visibility {
     #[must_use]
     pub fn closest_except(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, own: u32) -> Option<Hit> {
         let (t, surface) = self.nearest(origin, direction, t_min, t_max, own)?;
+        Some(self.hit((surface, t), origin, direction))
+    }
+
+    /// Surface and distance of the hit that [`closest`](Self::closest) tells more about.
+    #[must_use]
+    pub fn first(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<(u32, f32)> {
+        self.nearest(origin, direction, t_min, t_max, NO_BLOCKER).map(|(t, surface)| (surface, t))
+    }
+
+    /// All about where a ray meets a surface, at a distance that is known.
+    #[must_use]
+    pub fn hit(&self, (surface, t): (u32, f32), origin: Vec3, direction: Vec3) -> Hit {
         let geometry = &self.geometries[surface as usize];
         let uv = geometry.parameters_of(origin + direction * t);
         let normal = geometry.normal(uv);
-        Some(Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 })
+        Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 }
     }
 
     /// The side that a ray from the surface `own` meets first, with t < `t_max`, and at which t, in multiples of its
@@ -351,43 +365,42 @@ impl Visibility {
             }
             if index & LEAF == 0 {
                 let node = &self.nodes[index as usize];
-                let (near, mut mask) = ray.enter(node, t_min, best.0);
-                let base = stack.len();
-                while mask != 0 {
-                    let child = mask.trailing_zeros() as usize & 3;
-                    mask &= mask - 1;
-                    stack.push((node.children[child], near[child]));
-                    // The nearest last, to be popped first.
-                    let mut at = stack.len() - 1;
-                    while at > base && stack[at - 1].1 < stack[at].1 {
-                        stack.swap(at - 1, at);
-                        at -= 1;
-                    }
-                }
+                let (near, mask) = ray.enter(node, t_min, best.0);
+                push_children(&mut stack, node, near, mask);
                 continue;
             }
             let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
-            for i in first as usize..(first + count) as usize {
-                let surface = self.surfaces[i];
-                let t = match &self.primitives[i] {
-                    Primitive::Polygon(_) if surface == own => None,
-                    Primitive::Polygon(outline) => outline.intersect(ray.origin, ray.direction, t_min, best.0),
-                    Primitive::Curved => {
-                        let geometry = &self.geometries[surface as usize];
-                        let gap = if surface == own { geometry.self_gap() / length } else { 0.0 };
-                        if surface == own && geometry.is_flat() {
-                            None
-                        } else {
-                            geometry.intersect(ray.origin, ray.direction, t_min.max(gap), best.0).map(|hit| hit.0)
-                        }
-                    }
-                };
-                if let Some(t) = t {
-                    best = (t, Some(surface));
+            for primitive in first..first + count {
+                if let Some(t) = self.meets(primitive, (origin, direction), (t_min, best.0), (own, length)) {
+                    best = (t, Some(self.surfaces[primitive as usize]));
                 }
             }
         }
         best.1.map(|surface| (best.0, surface))
+    }
+
+    /// Where a ray, whose direction has a length, meets a primitive between two distances, if not on its `own` surface.
+    #[inline]
+    fn meets(
+        &self,
+        primitive: u32,
+        (origin, direction): (Vec3, Vec3),
+        (t_min, t_max): (f32, f32),
+        (own, length): (u32, f32),
+    ) -> Option<f32> {
+        let surface = self.surfaces[primitive as usize];
+        match &self.primitives[primitive as usize] {
+            Primitive::Polygon(_) if surface == own => None,
+            Primitive::Polygon(outline) => outline.intersect(origin, direction, t_min, t_max),
+            Primitive::Curved => {
+                let geometry = &self.geometries[surface as usize];
+                if surface == own && geometry.is_flat() {
+                    return None;
+                }
+                let gap = if surface == own { geometry.self_gap() / length } else { 0.0 };
+                geometry.intersect(origin, direction, t_min.max(gap), t_max).map(|hit| hit.0)
+            }
+        }
     }
 
     /// Whether any surface whose box, about, reaches into a region is `wanted`.
@@ -477,6 +490,22 @@ impl Visibility {
     }
 }
 
+/// Puts those of a node's children that a mask has on a stack, the nearest last, to be popped first.
+#[inline]
+fn push_children(stack: &mut SmallVec<[(u32, f32); 64]>, node: &Node, near: Vec4, mut mask: u32) {
+    let base = stack.len();
+    while mask != 0 {
+        let child = mask.trailing_zeros() as usize & 3;
+        mask &= mask - 1;
+        stack.push((node.children[child], near[child]));
+        let mut at = stack.len() - 1;
+        while at > base && stack[at - 1].1 < stack[at].1 {
+            stack.swap(at - 1, at);
+            at -= 1;
+        }
+    }
+}
+
 /// Half the surface area of a node's box.
 fn half_area(bvh: &Bvh2, node: usize) -> f32 {
     bvh.nodes[node].aabb().half_area()
@@ -530,9 +559,11 @@ impl Groups {
     }
 }
 
+mod beam;
 mod keep;
 mod shaft;
 #[cfg(test)]
 mod tests;
 
+pub use beam::Beam;
 pub(crate) use shaft::{End, MOST_LISTED, Proof, Shaft};

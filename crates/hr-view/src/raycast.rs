@@ -13,12 +13,16 @@ use glossy_ext::{Basis, GlossyField, Incident, Lobe, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2};
 use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
-use hr_scene::{Camera, Film, Image, Material, Pixel, Rays, Scene};
+use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, OnceLock};
+
+mod sight;
+
+use sight::Sight;
 
 /// Rays that follow a lobe, per ray of the pixel.
 const LOBE_RAYS: usize = 6;
@@ -209,7 +213,9 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let bands = image.pixels.par_chunks_mut(BAND * width).zip(wanted.par_chunks_mut(BAND * width));
         let edges = bands.enumerate().flat_map_iter(|(band, (means, wanted))| {
             let first = band * BAND;
-            let pixels = self.band((eye, &rays), width, first, wanted, &tell);
+            let sight =
+                Sight::new(&self.solution.scene.visibility, (eye, &rays), 0..width, first..first + means.len() / width);
+            let pixels = self.band(&sight, wanted, &tell);
             means.iter_mut().zip(&pixels).for_each(|(mean, pixel)| *mean = pixel.radiance());
             let is_printed = move |pixel: &Pixel| printed && Pixel::contrast(&std::iter::once(pixel)) > ALIKE;
             let place = move |(at, pixel): (usize, Pixel)| is_printed(&pixel).then_some((first * width + at, pixel));
@@ -226,8 +232,9 @@ impl<'a, B: Basis> RayCaster<'a, B> {
                     tell();
                 }
                 (rounds > 0).then(|| {
-                    let mut pixel = self.pixel((eye, &rays), x, y, u32::from(rounds), &mut shared);
-                    self.cover((eye, &rays), (x, y), wanted[y * width + x], &mut pixel, &mut shared);
+                    let sight = Sight::new(&self.solution.scene.visibility, (eye, &rays), x..x + 1, y..y + 1);
+                    let mut pixel = self.pixel(&sight, [x, y], u32::from(rounds), &mut shared);
+                    self.cover(&sight, [x, y], wanted[y * width + x], &mut pixel, &mut shared);
                     (y * width + x, pixel)
                 })
             };
@@ -238,25 +245,19 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         Film::new(image, edges.into_iter().chain(noisy).collect())
     }
 
-    /// What is seen in rows of pixels from the `first` on, and what is wanted for each. How much they see of each surface is known better
+    /// What is seen in rows of pixels, and what is wanted for each. How much they see of each surface is known better
     /// where those beside them differ, or have edges; were that asked of a pixel itself, what is smaller than a pixel would be too
     /// dark, as it is seen only where it was met.
-    fn band(
-        &self,
-        (eye, rays): (Vec3, &Rays),
-        width: usize,
-        first: usize,
-        wanted: &mut [Wanted],
-        tell: &dyn Fn(),
-    ) -> Vec<Pixel> {
-        let (mut shared, count) = (Shared::default(), wanted.len());
-        let mut pixels = Vec::with_capacity(count);
-        for y in 0..count / width {
-            pixels.extend((0..width).map(|x| self.pixel((eye, rays), x, first + y, 0, &mut shared)));
+    fn band(&self, sight: &Sight<'_>, wanted: &mut [Wanted], tell: &dyn Fn()) -> Vec<Pixel> {
+        let (mut shared, columns, rows) = (Shared::default(), sight.columns(), sight.rows());
+        let (width, height) = (columns.len(), rows.len());
+        let mut pixels = Vec::with_capacity(wanted.len());
+        for y in rows.clone() {
+            pixels.extend(columns.clone().map(|x| self.pixel(sight, [x, y], 0, &mut shared)));
             tell();
         }
         for (at, wanted) in wanted.iter_mut().enumerate() {
-            let around = around(width, 0..count / width, at % width, at / width);
+            let around = around(width, 0..height, at % width, at / width);
             let beside = around.filter(|&other| other != at).map(|other| &pixels[other]);
             let contrast = Pixel::contrast(&beside);
             let side = (EDGE * contrast).powf(2.0 / 3.0).ceil() as u32;
@@ -264,22 +265,18 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             *wanted = Wanted { rounds: rounds(&pixels[at]), side, plain: contrast <= PLAIN };
         }
         for (at, (pixel, wanted)) in pixels.iter_mut().zip(wanted).enumerate() {
-            let place = (at % width, first + at / width);
-            self.cover((eye, rays), place, *wanted, pixel, &mut shared);
+            let place = [columns.start + at % width, rows.start + at / width];
+            self.cover(sight, place, *wanted, pixel, &mut shared);
         }
         pixels
     }
 
     /// Finds with a grid of rays how much a pixel sees of each surface. Light is that of the samples there are; what was not seen by
     /// them has one.
-    fn cover(
-        &self,
-        (eye, rays): (Vec3, &Rays),
-        (x, y): (usize, usize),
-        wanted: Wanted,
-        pixel: &mut Pixel,
-        shared: &mut Shared,
-    ) {
+    fn cover(&self, sight: &Sight<'_>, [x, y]: [usize; 2], wanted: Wanted, pixel: &mut Pixel, shared: &mut Shared) {
+        if sight.is_even([x, y]) {
+            return;
+        }
         let (seed, side) = (hash(x as u32, y as u32 ^ 0x91e7), u32::from(wanted.side));
         let is_first = |i: &u32| ((i / side) | (i % side)).is_multiple_of(2);
         let all = 0..side * side;
@@ -288,30 +285,40 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             if count == firsts && wanted.plain && !pixel.has_edge() {
                 return;
             }
-            let direction = rays.within(x, y, stratified(side, i, seed));
-            let hit = self.solution.scene.visibility.closest_except(eye, direction, START, f32::MAX, u32::MAX);
-            let surface = hit.map(|hit| hit.surface);
-            if !pixel.cover(surface) {
-                let light = hit.map(|hit| self.toward_eye(hit, direction, 0, &Sampler::new(seed, i), shared));
-                pixel.add(surface, light.unwrap_or(Rgb::ZERO));
+            let (_, direction) = sight.ray([x, y], stratified(side, i, seed));
+            let first = sight.first([x, y], direction);
+            if !pixel.cover(first.map(|first| first.0)) {
+                self.add_to(pixel, (sight, first), direction, &Sampler::new(seed, i), shared);
             }
         }
     }
 
     /// What is seen in a pixel with some rounds of rays more than all have.
-    fn pixel(&self, (eye, rays): (Vec3, &Rays), x: usize, y: usize, rounds: u32, shared: &mut Shared) -> Pixel {
+    fn pixel(&self, sight: &Sight<'_>, [x, y]: [usize; 2], rounds: u32, shared: &mut Shared) -> Pixel {
         let (all, seed) = (self.grid * self.grid, hash(x as u32, y as u32 ^ 0x6b43));
         let mut pixel = Pixel::default();
-        shared.ray = (eye, rays.within(x, y, Vec2::splat(0.5)));
+        shared.ray = sight.ray([x, y], Vec2::splat(0.5));
         shared.middle = None;
         for i in 0..all * (1 + rounds) {
             let sampler = Sampler::new(seed, i);
             let within = if i < all { stratified(self.grid, i, seed) } else { sampler.pair(0) };
-            let direction = rays.within(x, y, within);
-            let (surface, light) = self.seen(eye, direction, u32::MAX, 0, &sampler, shared);
-            pixel.add(surface, light);
+            let (_, direction) = sight.ray([x, y], within);
+            self.add_to(&mut pixel, (sight, sight.first([x, y], direction)), direction, &sampler, shared);
         }
         pixel
+    }
+
+    /// Adds what a ray sees of the surface that it meets first.
+    fn add_to(
+        &self,
+        pixel: &mut Pixel,
+        (sight, first): (&Sight<'_>, Option<(u32, f32)>),
+        direction: Vec3,
+        sampler: &Sampler,
+        shared: &mut Shared,
+    ) {
+        let light = first.map(|first| self.toward_eye(sight.hit(first, direction), direction, 0, sampler, shared));
+        pixel.add(first.map(|first| first.0), light.unwrap_or(Rgb::ZERO));
     }
 
     /// The glossy light of the leaf in the middle of a pixel, where it is that of samples.
@@ -325,26 +332,14 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             return None;
         }
         let met = self.met(hit, leaf, direction, reflector);
-        let lobe = self.lobe(&met).filter(|_| met.reflector.mirror() == Rgb::ZERO)?;
-        let light = self.by_samples(&met, shared);
+        let width = if self.mode == Mode::Distributions {
+            met.reflector.lobe(met.place().local(met.away)).width
+        } else {
+            self.lobe(&met).filter(|_| met.reflector.mirror() == Rgb::ZERO)?.width
+        };
+        let light = self.without_rays(&met, shared);
         let cluster = self.solution.faces.standing(leaf.0);
-        Some(Shaded { cluster, at: hit.point, seen: glossy::mirrored(met.normal, met.away), width: lobe.width, light })
-    }
-
-    /// The surface that is seen from `origin` (unit space) in `direction`, and the radiance that arrives.
-    fn seen(
-        &self,
-        origin: Vec3,
-        direction: Vec3,
-        own: u32,
-        bounce: u32,
-        sampler: &Sampler,
-        shared: &mut Shared,
-    ) -> (Option<u32>, Rgb) {
-        let visibility = &self.solution.scene.visibility;
-        let hit = visibility.closest_except(origin, direction, START, f32::MAX, own);
-        let Some(hit) = hit else { return (None, Rgb::ZERO) };
-        (Some(hit.surface), self.toward_eye(hit, direction, bounce, sampler, shared))
+        Some(Shaded { cluster, at: hit.point, seen: glossy::mirrored(met.normal, met.away), width, light })
     }
 
     /// Radiance that is emitted and reflected where a surface was hit, back against `direction`.
@@ -384,6 +379,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let faint = self.solution.faint[element.material as usize];
         let mirrors = met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES;
         let glossy = match self.mode {
+            Mode::Distributions if bounce == 0 => self.shared(&met, shared),
             Mode::Distributions => self.interpolated(&met),
             Mode::Samples if bounce == 0 || mirrors => self.reflected(&met, bounce, sampler, shared),
             Mode::Samples | Mode::Gather if faint != Rgb::ZERO => faint * irradiance * FRAC_1_PI,
@@ -461,15 +457,20 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             };
             return light + self.tracer.glossy(&met.hit, -met.away, pairs, &turns, &mut beyond);
         }
-        if bounce == 0 {
-            if shared.middle.is_none() {
-                shared.middle = Some(self.middle(shared));
-            }
-            if let Some(middle) = shared.middle.iter().flatten().find(|middle| self.is_same(middle, met)) {
-                return light + middle.light;
-            }
+        light + if bounce == 0 { self.shared(met, shared) } else { self.by_samples(met, shared) }
+    }
+
+    /// Glossy radiance toward the eye that is found without rays: that in the middle of the pixel, if it stands for the point's.
+    fn shared(&self, met: &Met, shared: &mut Shared) -> Rgb {
+        if shared.middle.is_none() {
+            shared.middle = Some(self.middle(shared));
         }
-        light + self.by_samples(met, shared)
+        let middle = shared.middle.iter().flatten().find(|middle| self.is_same(middle, met)).map(|middle| middle.light);
+        middle.unwrap_or_else(|| self.without_rays(met, shared))
+    }
+
+    fn without_rays(&self, met: &Met, shared: &mut Shared) -> Rgb {
+        if self.mode == Mode::Distributions { self.interpolated(met) } else { self.by_samples(met, shared) }
     }
 
     /// Whether the glossy light in the middle of a pixel stands for that of a point.
@@ -487,7 +488,9 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         if direction.dot(met.hit.normal) * side <= 0.0 {
             return Rgb::ZERO;
         }
-        self.seen(met.hit.point, direction, met.hit.surface, bounce + 1, sampler, shared).1
+        let (visibility, own) = (&self.solution.scene.visibility, met.hit.surface);
+        let hit = visibility.closest_except(met.hit.point, direction, START, f32::MAX, own);
+        hit.map_or(Rgb::ZERO, |hit| self.toward_eye(hit, direction, bounce + 1, sampler, shared))
     }
 }
 
@@ -611,16 +614,19 @@ mod tests {
         let asked = Solved::awaited(Arc::clone(&scene), settings, purpose, &mut |_| Wait::Whole);
         let solved = asked.expect("a sound scene").0;
         let caster = RayCaster::new(&scene, &solved.solution, Mode::Distributions);
-        let view = (solved.solution.scene.normalization.to_unit(DVec3::from(camera.eye)), &camera.rays());
+        let data = &solved.solution.scene;
+        let eye = data.normalization.to_unit(DVec3::from(camera.eye));
+        let rays = camera.rays();
+        let sight = Sight::new(&data.visibility, (eye, &rays), 0..90, 0..60);
         let (mut shared, mut off, mut light, mut early) = (Shared::default(), 0.0, 0.0, 0);
         for (x, y) in (0..60).flat_map(|y| (0..90).map(move |x| (x, y))) {
-            let seen = caster.pixel(view, x, y, 0, &mut shared);
+            let seen = caster.pixel(&sight, [x, y], 0, &mut shared);
             let [quick, thorough] = [true, false].map(|plain| {
                 let mut pixel = seen.clone();
-                caster.cover(view, (x, y), Wanted { rounds: 0, side: SIDE, plain }, &mut pixel, &mut shared);
+                caster.cover(&sight, [x, y], Wanted { rounds: 0, side: SIDE, plain }, &mut pixel, &mut shared);
                 pixel
             });
-            early += usize::from(quick != thorough);
+            early += usize::from(quick != thorough || sight.is_even([x, y]));
             off += (quick.radiance() - thorough.radiance()).abs().element_sum();
             light += thorough.radiance().element_sum();
         }

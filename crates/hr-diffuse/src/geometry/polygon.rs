@@ -196,12 +196,9 @@ impl Outline {
     /// passes between two polygons by rounding passes between no two that share an edge.
     #[inline]
     pub(crate) fn intersect(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<f32> {
-        let (x, y, z) = (self.x - origin.x, self.y - origin.y, self.z - origin.z);
-        let (nx, ny, nz) = (x.yzwx(), y.yzwx(), z.yzwx());
-        let (ex, ey, ez) = (nx - x, ny - y, nz - z);
-        let (sx, sy, sz) = (nx + x, ny + y, nz + z);
-        let volumes =
-            (ey * sz - ez * sy) * direction.x + (ez * sx - ex * sz) * direction.y + (ex * sy - ey * sx) * direction.z;
+        let corners @ [x, y, z] = [self.x - origin.x, self.y - origin.y, self.z - origin.z];
+        let [a, b, c] = edge_planes(corners);
+        let volumes = a * direction.x + b * direction.y + c * direction.z;
         let tolerance = EDGE_TOLERANCE * volumes.element_sum().abs();
         if volumes.min_element() < -tolerance && volumes.max_element() > tolerance {
             return None;
@@ -213,6 +210,35 @@ impl Outline {
         let t = Vec3::new(x.x, y.x, z.x).dot(self.normal) / along;
         (t > t_min && t < t_max).then_some(t)
     }
+
+    /// Whether some edge has the polygon on one side, and on the other all rays from `origin` that run between four `directions`.
+    pub(crate) fn is_beside(&self, origin: Vec3, directions: &[Vec3; 4]) -> bool {
+        let corners @ [x, y, z] = [self.x - origin.x, self.y - origin.y, self.z - origin.z];
+        let [a, b, c] = edge_planes(corners);
+        let (mut low, mut high, mut all) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0.0);
+        for direction in directions {
+            let volumes = a * direction.x + b * direction.y + c * direction.z;
+            (low, high) = (low.min(volumes), high.max(volumes));
+            all += volumes.element_sum().abs();
+        }
+        // Volumes of rays that hit have the sign of this, which is unclear where the origin is in the polygon's plane.
+        let (area, corner) = (Vec3::new(a.element_sum(), b.element_sum(), c.element_sum()), Vec3::new(x.x, y.x, z.x));
+        let turn = area.dot(corner);
+        if turn.abs() <= IN_PLANE * area.length() * corner.length() {
+            return false;
+        }
+        let tolerance = Vec4::splat(2.0 * EDGE_TOLERANCE * all);
+        if turn > 0.0 { high.cmplt(-tolerance).any() } else { low.cmpgt(tolerance).any() }
+    }
+}
+
+/// Twice the normals of the planes through the origin and each edge of a polygon.
+#[inline]
+fn edge_planes([x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
+    let (nx, ny, nz) = (x.yzwx(), y.yzwx(), z.yzwx());
+    let (ex, ey, ez) = (nx - x, ny - y, nz - z);
+    let (sx, sy, sz) = (nx + x, ny + y, nz + z);
+    [ey * sz - ez * sy, ez * sx - ex * sz, ex * sy - ey * sx]
 }
 
 /// Rejects what has no area before it is rounded to f32.

@@ -27,6 +27,65 @@ fn end() -> impl Strategy<Value = Vec3> {
     .prop_map(Vec3::from_array)
 }
 
+/// Places in a pyramid's cross section, from its middle.
+fn across() -> impl Strategy<Value = [f64; 2]> {
+    [-1.0..1.0, -1.0..1.0]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(256))]
+
+    /// Rays of a beam meet what they meet without it, and all the same where the beam says so.
+    #[test]
+    fn beams_hold_what_their_rays_meet_first(
+        surfaces in prop::collection::vec(surface(), 0..40),
+        eye in end(),
+        target in end(),
+        (width, margin) in (prop::sample::select(vec![1.0, 0.1, 0.01, 1e-3, 1e-5]), 1e-3..1e-2),
+        places in prop::collection::vec(across(), 40),
+    ) {
+        let geometries: Vec<Geometry> = surfaces.iter().map(geometry).collect();
+        let visibility = Visibility::new(&geometries);
+        let forward = (target - eye).as_dvec3();
+        prop_assume!(forward.length() > 1e-3);
+        let (right, up) = forward.normalize().any_orthonormal_pair();
+        let toward = |[x, y]: [f64; 2]| (forward.normalize() + (right * x + up * y) * width).normalize();
+        let edge: f64 = 1.0 + margin;
+        let corners = [[-edge, -edge], [edge, -edge], [edge, edge], [-edge, edge]].map(toward);
+        let Some(beam) = visibility.beam(eye, corners, 1e-6) else { return Ok(()) };
+        let mut met = Vec::new();
+        for place in places {
+            let direction = toward(place).as_vec3();
+            let (found, expected) = (visibility.first_in(&beam, direction), visibility.first(eye, direction, 1e-6, f32::MAX));
+            // Surfaces that coincide are met in any order.
+            prop_assert_eq!(found.map(|hit| hit.1), expected.map(|hit| hit.1), "{:?}, {:?}", found, expected);
+            met.push(found.map(|hit| hit.0));
+        }
+        if beam.is_even() {
+            prop_assert!(met.iter().all(|surface| *surface == met[0]), "{:?}", met);
+        }
+    }
+}
+
+/// A wall hides all that is behind it; what stands before it is found, too.
+#[test]
+fn beams_end_at_walls() {
+    let square = |z: f64, half: f64| {
+        Shape::Quad(
+            [(-1, -1), (1, -1), (1, 1), (-1, 1)].map(|(x, y)| dvec3(f64::from(x) * half, f64::from(y) * half, z)),
+        )
+    };
+    let behind = (0..30).map(|i| square(2.0 + 0.1 * f64::from(i), 1.0));
+    let visibility = scene(behind.chain([square(1.0, 1.0), square(0.5, 0.02)]));
+    let corners = |x: f64| [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)].map(|(a, b)| dvec3(x + a, b, 1.0));
+    let [amid, aside] = [0.0, 0.5].map(|x| visibility.beam(Vec3::ZERO, corners(x), 1e-6).expect("few surfaces"));
+    assert_eq!((amid.count(), amid.is_even()), (2, false), "the wall and the square before it");
+    assert_eq!((aside.count(), aside.is_even()), (1, true), "the wall alone");
+    let away = corners(0.0).map(|corner| -corner);
+    let away = visibility.beam(Vec3::ZERO, away, 1e-6).expect("no surfaces");
+    assert_eq!((away.count(), away.is_even()), (0, true), "nothing");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
