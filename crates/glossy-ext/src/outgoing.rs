@@ -31,7 +31,8 @@ pub struct Focus([u16; 3]);
 impl Focus {
     /// The plane that fits the samples of a leaf with a radius best, where each counts by the square of its irradiance: what is spread over
     /// many directions has no edges that could be seen to move. Directions of samples are those of a frame whose columns are given.
-    /// What is nearer than the leaf is large is taken to be as far away as that: its ends see different things there.
+    /// What is nearer than the leaf is large counts as the farther away the nearer it is: what lies along the leaf looks the same from all
+    /// places.
     #[must_use]
     pub fn of(incident: &[Incident], frame: &Mat3, radius: f32) -> Self {
         let nearest = radius.max(f32::MIN_POSITIVE).recip();
@@ -41,7 +42,8 @@ impl Focus {
             let weight = f64::from(sample.irradiance.element_sum()).powi(2);
             matrix +=
                 DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z) * weight;
-            right += direction * (weight * f64::from(sample.nearness.min(nearest)));
+            let nearness = sample.nearness.min(nearest * (nearest / sample.nearness.max(f32::MIN_POSITIVE)));
+            right += direction * (weight * f64::from(nearness));
             sum += weight;
         }
         if sum <= 0.0 {
@@ -167,15 +169,18 @@ mod tests {
         }
     }
 
-    /// The end of a board along a wall sees the wall next to it, the middle what is next to the middle: along the board it sees neither.
+    /// The end of a board along a wall sees the wall next to it, the middle what is next to the middle: along the board it sees neither,
+    /// and from its ends what the middle sees of the room.
     #[test]
     fn what_touches_a_leaf_does_not_turn_the_view() {
-        let touching = lamps(&[Vec3::new(0.0, 0.01, 0.002), Vec3::new(0.3, -1.0, 1.5)]);
-        let focus = Focus::of(&touching, &Mat3::IDENTITY, 0.5);
-        let direction = Vec3::new(0.0, 0.94, 0.34).normalize();
-        for k in [-0.5, 0.5] {
-            let off = focus.from_middle(Vec3::X * k, direction).angle_between(direction);
-            assert!(off < 1.0, "turned by {off}");
+        let touching = |place: Vec3| Focus::of(&lamps(&[place, Vec3::new(0.3, -1.0, 1.5)]), &Mat3::IDENTITY, 0.5);
+        let along = Vec3::new(0.0, 0.94, 0.34).normalize();
+        let aslant = Vec3::new(0.5, -0.2, 0.8).normalize();
+        for (place, direction) in [(Vec3::Y * 0.01, along), (Vec3::new(0.08, -0.02, 0.01), aslant)] {
+            for k in [-0.5, 0.5] {
+                let off = touching(place).from_middle(Vec3::X * k, direction).angle_between(direction);
+                assert!(off < 0.5, "turned by {off} at {k} by what is at {place}");
+            }
         }
     }
 
