@@ -13,6 +13,9 @@ const MOST_MET: usize = 12;
 /// What lies outside no farther than this share of the distances there are is inside: rounding of points and rays.
 const SLACK: f32 = 1e-6;
 
+/// A unit step along any ray of a beam is at least so deep.
+const LEAST_DEPTH: f64 = 0.1;
+
 /// The surfaces that rays from a point, within a pyramid, may meet first.
 #[derive(Clone, Debug)]
 pub struct Beam {
@@ -38,9 +41,12 @@ struct Pyramid {
 }
 
 impl Pyramid {
-    /// None where the corners span nothing.
+    /// None where the corners span nothing, or nearly a half-space: depths along the axis tell nothing there.
     fn new(origin: Vec3, corners: [DVec3; 4]) -> Option<Self> {
         let axis = corners.iter().map(|corner| corner.normalize_or_zero()).sum::<DVec3>().try_normalize()?;
+        if corners.iter().any(|corner| corner.dot(axis) < LEAST_DEPTH * corner.length()) {
+            return None;
+        }
         let slack = SLACK * (1.0 + origin.abs().max_element());
         let mut sides = [(Vec3::ZERO, 0.0); 4];
         for (i, side) in sides.iter_mut().enumerate() {

@@ -84,6 +84,8 @@ fn beams_end_at_walls() {
     let away = corners(0.0).map(|corner| -corner);
     let away = visibility.beam(Vec3::ZERO, away, 1e-6).expect("no surfaces");
     assert_eq!((away.count(), away.is_even()), (0, true), "nothing");
+    let wide = corners(0.0).map(|corner| corner * dvec3(1e3, 1e3, 1.0));
+    assert!(visibility.beam(Vec3::ZERO, wide, 1e-6).is_none(), "nearly half of all directions");
 }
 
 proptest! {
