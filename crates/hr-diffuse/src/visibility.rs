@@ -320,14 +320,14 @@ impl Visibility {
     /// one not within the distance that rounding explains.
     #[must_use]
     pub fn closest_except(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, own: u32) -> Option<Hit> {
-        let (t, surface) = self.nearest(origin, direction, t_min, t_max, own)?;
-        Some(self.hit((surface, t), origin, direction))
+        let first = self.nearest(origin, direction, t_min, t_max, own)?;
+        Some(self.hit(first, origin, direction))
     }
 
     /// Surface and distance of the hit that [`closest`](Self::closest) tells more about.
     #[must_use]
     pub fn first(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<(u32, f32)> {
-        self.nearest(origin, direction, t_min, t_max, NO_BLOCKER).map(|(t, surface)| (surface, t))
+        self.nearest(origin, direction, t_min, t_max, NO_BLOCKER)
     }
 
     /// All about where a ray meets a surface, at a distance that is known.
@@ -342,15 +342,15 @@ impl Visibility {
     /// The side that a ray from the surface `own` meets first, with t < `t_max`, and at which t, in multiples of its
     /// direction.
     pub(crate) fn first_side(&self, origin: Vec3, direction: Vec3, t_max: f32, own: u32) -> Option<(Side, f32)> {
-        let (t, surface) = self.nearest(origin, direction, 0.0, t_max, own)?;
+        let (surface, t) = self.nearest(origin, direction, 0.0, t_max, own)?;
         let geometry = &self.geometries[surface as usize];
         // Where the normal is the same everywhere, the place on the surface need not be found.
         let uv = if geometry.is_flat() { Vec2::ZERO } else { geometry.parameters_of(origin + direction * t) };
         Some((2 * surface + u32::from(geometry.normal(uv).dot(direction) >= 0.0), t))
     }
 
-    /// Distance and surface of the hit that [`closest_except`](Self::closest_except) tells more about.
-    fn nearest(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, own: u32) -> Option<(f32, u32)> {
+    /// Surface and distance of the hit that [`closest_except`](Self::closest_except) tells more about.
+    fn nearest(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, own: u32) -> Option<(u32, f32)> {
         let length = direction.length();
         if !(length > 0.0 && length.is_finite() && origin.is_finite()) || self.nodes.is_empty() {
             return None;
@@ -376,7 +376,7 @@ impl Visibility {
                 }
             }
         }
-        best.1.map(|surface| (best.0, surface))
+        best.1.map(|surface| (surface, best.0))
     }
 
     /// Where a ray, whose direction has a length, meets a primitive between two distances, if not on its `own` surface.

@@ -8,11 +8,9 @@ use hr_diffuse::{Hit, Visibility};
 use hr_scene::Rays;
 use std::ops::Range;
 
-/// Pixels, squared, of the widest beams. Where these meet many surfaces they are parted, …
+/// Pixels, squared, of the widest beams. …
 const WIDEST: usize = 8;
-/// … down to so many.
-const NARROWEST: usize = 1;
-/// Of a beam that is not parted further.
+/// … Where these meet more surfaces than so many they are parted, down to single pixels.
 const FEW: usize = 4;
 /// Beams reach so many pixels beyond their own, for rounding.
 const MARGIN: f64 = 0.01;
@@ -68,7 +66,8 @@ impl<'a> Sight<'a> {
         let [to_x, to_y] = [right, bottom].map(|end| end as f64 + MARGIN);
         let corners = [(x, y), (to_x, y), (to_x, to_y), (x, to_y)].map(|(x, y)| self.rays.direction(x, y));
         let beam = self.visibility.beam(self.eye, corners, START);
-        if let Some(beam) = beam.filter(|beam| side <= NARROWEST || beam.count() <= FEW) {
+        let is_single = right - left == 1 && bottom - top == 1;
+        if let Some(beam) = beam.filter(|beam| is_single || beam.count() <= FEW) {
             for y in top..bottom {
                 for x in left..right {
                     let pixel = self.index([x, y]);
@@ -76,7 +75,7 @@ impl<'a> Sight<'a> {
                 }
             }
             self.beams.push(beam);
-        } else if side > NARROWEST && right - left + bottom - top > 2 {
+        } else if !is_single {
             let half = side / 2;
             for [x, y] in [[left, top], [left + half, top], [left, top + half], [left + half, top + half]] {
                 self.look([x, y], half);
