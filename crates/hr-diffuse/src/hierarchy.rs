@@ -18,7 +18,6 @@ use crate::tree::{Leaves, tree};
 use crate::visibility::Visibility;
 use crate::{Cone, DiffuseMaterial, Facing, Rgb, SurfaceReflectance};
 use glam::{Vec2, Vec3};
-use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// Children per cluster: the binary tree is widened to it.
@@ -531,8 +530,8 @@ impl Elements {
                 return Some(NodeId(node));
             }
             let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
-            let domains: SmallVec<[Domain; 4]> = self.nodes[children].iter().map(|child| child.domain).collect();
-            node = element.first_child + scene.surfaces()[surface as usize].locate(&domains, uv) as u32;
+            let domains = self.nodes[children].iter().map(|child| child.domain);
+            node = element.first_child + scene.surfaces()[surface as usize].locate(domains, uv) as u32;
         }
     }
 

@@ -94,33 +94,35 @@ impl Vertices {
     /// The triangle of a leaf's fans that holds (u, v): its vertices and their weights, which sum to 1.
     #[must_use]
     pub fn interpolation(&self, leaf: u32, uv: Vec2) -> [(u32, f32); 3] {
+        let shares = |[middle, a, b]: [&Corner; 3]| {
+            let (p, q, r) = (a.uv - middle.uv, b.uv - middle.uv, uv - middle.uv);
+            (p.perp_dot(q), r.perp_dot(q), p.perp_dot(r))
+        };
+        let weighted = |[middle, a, b]: [&Corner; 3], wa: f32, wb: f32| {
+            [(middle.vertex, 1.0 - wa - wb), (a.vertex, wa), (b.vertex, wb)]
+        };
+        for triangle in self.triangles(leaf) {
+            let (area, a, b) = shares(triangle);
+            let sign = area.signum();
+            if area.abs() > f32::MIN_POSITIVE && (sign * a).min(sign * b).min(sign * (area - a - b)) >= 0.0 {
+                return weighted(triangle, a / area, b / area);
+            }
+        }
+        // Rounding put the point outside of every triangle: the nearest one, without extrapolation.
         let Some(Corner { vertex, .. }) = self.fans(leaf).flatten().next() else { return [(0, 0.0); 3] };
         let mut best = [(*vertex, 1.0), (*vertex, 0.0), (*vertex, 0.0)];
         let mut best_low = f32::NEG_INFINITY;
-        for [middle, a, b] in self.triangles(leaf) {
-            let (p, q, r) = (a.uv - middle.uv, b.uv - middle.uv, uv - middle.uv);
-            let area = p.perp_dot(q);
-            if area.abs() <= f32::MIN_POSITIVE {
-                continue;
-            }
-            let (wa, wb) = (r.perp_dot(q) / area, p.perp_dot(r) / area);
+        for triangle in self.triangles(leaf) {
+            let (area, a, b) = shares(triangle);
+            let (wa, wb) = (a / area, b / area);
             let low = wa.min(wb).min(1.0 - wa - wb);
-            if low > best_low {
+            if area.abs() > f32::MIN_POSITIVE && low > best_low {
                 best_low = low;
-                best = [(middle.vertex, 1.0 - wa - wb), (a.vertex, wa), (b.vertex, wb)];
-                if low >= 0.0 {
-                    break;
-                }
+                best = weighted(triangle, wa, wb);
             }
         }
-        if best_low < 0.0 {
-            // Rounding put the point outside of every triangle: the nearest one, without extrapolation.
-            let sum: f32 = best.iter().map(|(_, w)| w.max(0.0)).sum();
-            for (_, w) in &mut best {
-                *w = w.max(0.0) / sum.max(f32::MIN_POSITIVE);
-            }
-        }
-        best
+        let sum: f32 = best.iter().map(|(_, w)| w.max(0.0)).sum();
+        best.map(|(vertex, w)| (vertex, w.max(0.0) / sum.max(f32::MIN_POSITIVE)))
     }
 
     /// The mean over a leaf of what is known at vertices; `None` for a leaf without extent.

@@ -306,7 +306,7 @@ impl Visibility {
                 t_max = t_max.min(1.0 - gap);
             }
         }
-        geometry.intersect(from, direction, t_min, t_max).is_some()
+        geometry.distance(from, direction, t_min, t_max).is_some()
     }
 
     /// The nearest surface that a ray meets, from either side, with `t_min` < t < `t_max` in multiples of
@@ -335,8 +335,8 @@ impl Visibility {
     pub fn hit(&self, (surface, t): (u32, f32), origin: Vec3, direction: Vec3) -> Hit {
         let geometry = &self.geometries[surface as usize];
         let uv = geometry.parameters_of(origin + direction * t);
-        let normal = geometry.normal(uv);
-        Hit { surface, t, uv, point: geometry.point(uv), normal, front: normal.dot(direction) < 0.0 }
+        let (point, normal) = geometry.point_and_normal(uv);
+        Hit { surface, t, uv, point, normal, front: normal.dot(direction) < 0.0 }
     }
 
     /// The side that a ray from the surface `own` meets first, with t < `t_max`, and at which t, in multiples of its
@@ -398,7 +398,7 @@ impl Visibility {
                     return None;
                 }
                 let gap = if surface == own { geometry.self_gap() / length } else { 0.0 };
-                geometry.intersect(origin, direction, t_min.max(gap), t_max).map(|hit| hit.0)
+                geometry.distance(origin, direction, t_min.max(gap), t_max)
             }
         }
     }

@@ -10,7 +10,7 @@ use crate::interrupt::{Interrupt, STOPPING};
 use crate::loading::{is_dark, load};
 use crate::metering;
 use crate::progress::Progress;
-use crate::raycast::RayCaster;
+use crate::raycast::{RayCaster, Spared};
 use crate::session;
 use crate::solution_file;
 use crate::solved::{Accuracy, Purpose, Solved, Wanted};
@@ -228,19 +228,19 @@ impl Show<'_> {
         };
         self.warn_if_black(film.image.pixels.iter().all(|pixel| *pixel == Rgb::ZERO));
         film.save(path, &ToneMap::default(), scene.primaries)?;
-        self.write_stats()
+        self.write_stats(caster.spared())
     }
 
     fn html(&self, path: &Path) -> Result<(), ViewError> {
         self.progress.at("writing the page", 0.0);
         html::write(self.solved, path)?;
-        self.write_stats()
+        self.write_stats(Spared::default())
     }
 
     fn export(&self, path: &Path) -> Result<(), ViewError> {
         self.progress.at("writing the solution", 0.0);
         export::write(self.solved, path)?;
-        self.write_stats()
+        self.write_stats(Spared::default())
     }
 
     /// Numbered PNG files, all exposed alike.
@@ -257,7 +257,7 @@ impl Show<'_> {
             film.save(&folder.join(format!("frame-{number:04}.png")), &tone_map, scene.primaries)?;
         }
         self.progress.say(&format!("{FRAMES} frames written to {}", folder.display()));
-        self.write_stats()
+        self.write_stats(caster.spared())
     }
 
     /// Where nothing shines at all, that has been said.
@@ -275,11 +275,11 @@ impl Show<'_> {
     }
 
     /// What `--stats` asks for, up to now.
-    fn write_stats(&self) -> Result<(), ViewError> {
+    fn write_stats(&self, spared: Spared) -> Result<(), ViewError> {
         let Some(path) = &self.args.stats else { return Ok(()) };
         let now = self.progress.elapsed();
         let times =
             Times { load: self.loaded.as_secs_f64(), show: (now - self.begin).as_secs_f64(), total: now.as_secs_f64() };
-        stats::write(path, self.solved, self.accuracy, &times)
+        stats::write(path, self.solved, self.accuracy, &times, spared)
     }
 }

@@ -17,7 +17,7 @@ use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 mod sight;
@@ -38,6 +38,8 @@ const MOST_AT_EDGES: u32 = 10;
 const PLAIN: f32 = 2.0;
 /// Pixels are printed surface by surface where these differ by more than this share of the mean.
 const ALIKE: f32 = 0.05;
+/// A pixel that sees one polygon has one ray, unless it and such ones around it differ by more than this share of their mean.
+const SMOOTH: f32 = 0.05;
 /// Rows of pixels that are done together.
 const BAND: usize = 8;
 /// Where the standard error of a pixel is larger than this share of its light, there are as many more rays for a print as would
@@ -82,6 +84,17 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     glowing: Vec<u32>,
     /// By node, which emitters light it; found out of leaves where it is asked for.
     nearby: Vec<OnceLock<Box<Nearby>>>,
+    even: AtomicU64,
+    smooth: AtomicU64,
+}
+
+/// Pixels that see one polygon and were spared rays for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Spared {
+    /// Those for which no ray looked for edges.
+    pub even_pixels: u64,
+    /// Those that have one ray, in their middle, as they differ little from those beside them.
+    pub smooth_pixels: u64,
 }
 
 /// A point that a ray met.
@@ -147,6 +160,15 @@ fn rounds(pixel: &Pixel) -> u8 {
     (times.ceil() - 1.0).clamp(0.0, f32::from(NOISE_ROUNDS)) as u8
 }
 
+/// By how much radiances differ, in terms of their mean: the channel where that is most.
+fn differ(radiances: impl Iterator<Item = Rgb>) -> f32 {
+    let (mut low, mut high, mut sum, mut count) = (Rgb::INFINITY, Rgb::NEG_INFINITY, Rgb::ZERO, 0.0);
+    for radiance in radiances {
+        (low, high, sum, count) = (low.min(radiance), high.max(radiance), sum + radiance, count + 1.0);
+    }
+    (high - low).max_element() * count / sum.max_element().max(f32::MIN_POSITIVE)
+}
+
 /// A place in a pixel: one in each cell of a square grid.
 fn stratified(side: u32, i: u32, seed: u32) -> Vec2 {
     (Vec2::new((i % side) as f32, (i / side) as f32) + point2(seed, i)) / side as f32
@@ -162,7 +184,18 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let nodes = if mode == Mode::Distributions { 0 } else { solution.elements.nodes.len() };
         let nearby = std::iter::repeat_with(OnceLock::new).take(nodes).collect();
         let glowing = glowing.iter().map(|&(node, _)| node).collect();
-        Self { scene, solution, mode, grid: 3, followed: f32::INFINITY, tracer, glowing, nearby }
+        Self {
+            scene,
+            solution,
+            mode,
+            grid: 3,
+            followed: f32::INFINITY,
+            tracer,
+            glowing,
+            nearby,
+            even: AtomicU64::new(0),
+            smooth: AtomicU64::new(0),
+        }
     }
 
     /// Rays per pixel, squared: 1…16. 3 by default. A final gather has more of them in proportion.
@@ -191,6 +224,13 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     #[must_use]
     pub fn film(&self, camera: &Camera, watch: &(dyn Fn(f32) + Sync)) -> Film {
         self.expose(camera, true, watch)
+    }
+
+    /// What the pixels of all pictures so far did without.
+    #[must_use]
+    pub fn spared(&self) -> Spared {
+        let [even_pixels, smooth_pixels] = [&self.even, &self.smooth].map(|count| count.load(Ordering::Relaxed));
+        Spared { even_pixels, smooth_pixels }
     }
 
     /// To be printed or not: rays by which a print has less noise do not enter the image.
@@ -251,22 +291,34 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     fn band(&self, sight: &Sight<'_>, wanted: &mut [Wanted], tell: &dyn Fn()) -> Vec<Pixel> {
         let (mut shared, columns, rows) = (Shared::default(), sight.columns(), sight.rows());
         let (width, height) = (columns.len(), rows.len());
+        let place = |at: usize| [columns.start + at % width, rows.start + at / width];
+        let glances: Vec<_> = (0..wanted.len()).map(|at| self.glance(sight, place(at), &mut shared)).collect();
+        let smooth = |at: usize| {
+            let beside =
+                || around(width, 0..height, at % width, at / width).filter_map(|beside| glances[beside].as_ref());
+            glances[at].as_ref().filter(|_| differ(beside().map(Pixel::radiance)) <= SMOOTH)
+        };
         let mut pixels = Vec::with_capacity(wanted.len());
-        for y in rows.clone() {
-            pixels.extend(columns.clone().map(|x| self.pixel(sight, [x, y], 0, &mut shared)));
-            tell();
+        for at in 0..wanted.len() {
+            let glance = smooth(at).cloned();
+            self.smooth.fetch_add(u64::from(glance.is_some()), Ordering::Relaxed);
+            pixels.push(glance.unwrap_or_else(|| self.pixel(sight, place(at), 0, &mut shared)));
+            if (at + 1).is_multiple_of(width) {
+                tell();
+            }
         }
         for (at, wanted) in wanted.iter_mut().enumerate() {
             let around = around(width, 0..height, at % width, at / width);
             let beside = around.filter(|&other| other != at).map(|other| &pixels[other]);
             let contrast = Pixel::contrast(&beside);
             let side = (EDGE * contrast).powf(2.0 / 3.0).ceil() as u32;
-            let side = if side > self.grid { side.min(MOST_AT_EDGES) as u8 } else { 0 };
+            let has_edges = side > self.grid && !sight.is_even(place(at));
+            self.even.fetch_add(u64::from(side > self.grid && !has_edges), Ordering::Relaxed);
+            let side = if has_edges { side.min(MOST_AT_EDGES) as u8 } else { 0 };
             *wanted = Wanted { rounds: rounds(&pixels[at]), side, plain: contrast <= PLAIN };
         }
         for (at, (pixel, wanted)) in pixels.iter_mut().zip(wanted).enumerate() {
-            let place = [columns.start + at % width, rows.start + at / width];
-            self.cover(sight, place, *wanted, pixel, &mut shared);
+            self.cover(sight, place(at), *wanted, pixel, &mut shared);
         }
         pixels
     }
@@ -274,9 +326,6 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// Finds with a grid of rays how much a pixel sees of each surface. Light is that of the samples there are; what was not seen by
     /// them has one.
     fn cover(&self, sight: &Sight<'_>, [x, y]: [usize; 2], wanted: Wanted, pixel: &mut Pixel, shared: &mut Shared) {
-        if sight.is_even([x, y]) {
-            return;
-        }
         let (seed, side) = (hash(x as u32, y as u32 ^ 0x91e7), u32::from(wanted.side));
         let is_first = |i: &u32| ((i / side) | (i % side)).is_multiple_of(2);
         let all = 0..side * side;
@@ -291,6 +340,23 @@ impl<'a, B: Basis> RayCaster<'a, B> {
                 self.add_to(pixel, (sight, first), direction, &Sampler::new(seed, i), shared);
             }
         }
+    }
+
+    /// What is seen in the middle of a pixel that stands for all of it, as it sees one polygon only and light that is known without noise.
+    fn glance(&self, sight: &Sight<'_>, pixel: [usize; 2], shared: &mut Shared) -> Option<Pixel> {
+        if self.mode != Mode::Distributions || !sight.is_even(pixel) {
+            return None;
+        }
+        let (_, direction) = sight.ray(pixel, Vec2::splat(0.5));
+        let first = sight.first(pixel, direction);
+        if first.is_some_and(|(surface, _)| self.scene.base_color(surface, 0.0, 0.0).is_some()) {
+            return None;
+        }
+        // The middle of the pixel is this ray's own.
+        shared.middle = Some(None);
+        let mut seen = Pixel::default();
+        self.add_to(&mut seen, (sight, first), direction, &Sampler::new(0, 0), shared);
+        Some(seen)
     }
 
     /// What is seen in a pixel with some rounds of rays more than all have.
@@ -601,9 +667,10 @@ mod tests {
     use crate::solved::{Purpose, Solved, Wanted as Wait};
     use hr_diffuse::Settings;
 
-    /// Where a quarter of the rays that look for edges meets what the pixel saw, the others bring next to nothing.
+    /// Where a quarter of the rays that look for edges meets what the pixel saw, the others bring next to nothing; so do all rays but one
+    /// where one polygon is seen.
     #[test]
-    fn edges_beside_a_pixel_need_no_close_look() {
+    fn rays_that_are_spared_bring_next_to_nothing() {
         const SIDE: u8 = 8;
         let scene = Arc::new(Scene::load("room").expect("built in"));
         let mut camera = scene.default_camera();
@@ -626,11 +693,25 @@ mod tests {
                 caster.cover(&sight, [x, y], Wanted { rounds: 0, side: SIDE, plain }, &mut pixel, &mut shared);
                 pixel
             });
-            early += usize::from(quick != thorough || sight.is_even([x, y]));
+            early += usize::from(quick != thorough);
             off += (quick.radiance() - thorough.radiance()).abs().element_sum();
             light += thorough.radiance().element_sum();
         }
         assert!(early > 3_000, "most pixels see one surface: {early}");
         assert!(off < 1e-3 * light, "{:.5} of the light", off / light);
+
+        // Smooth pixels have one ray.
+        let mut wanted = vec![Wanted::default(); 90 * 60];
+        let band = caster.band(&sight, &mut wanted, &|| ());
+        let (mut off, mut light, mut most) = (0.0, 0.0, 0.0_f32);
+        for (at, pixel) in band.iter().enumerate().filter(|(at, _)| sight.is_even([at % 90, at / 90])) {
+            let full = caster.pixel(&sight, [at % 90, at / 90], 0, &mut shared).radiance();
+            let difference = (pixel.radiance() - full).abs().element_sum();
+            most = most.max(difference / full.element_sum());
+            (off, light) = (off + difference, light + full.element_sum());
+        }
+        let spared = caster.spared();
+        assert!(spared.even_pixels > 100 && spared.smooth_pixels > 300, "{spared:?}");
+        assert!(off < 2e-3 * light && most < 0.05, "{:.5} of the light, of a pixel {most}", off / light);
     }
 }

@@ -12,6 +12,7 @@ use crate::glossy::Mode;
 use crate::interrupt::{Interrupt, STOPPING};
 use crate::loading::load;
 use crate::progress::{Progress, activity};
+use crate::raycast::Spared;
 use crate::solution_file;
 use crate::solved::{Accuracy, Editable, Purpose, Solved, Wanted};
 use crate::stats::{self, Times};
@@ -79,7 +80,7 @@ impl Results {
             solution_file::save(path, solved, *accuracy)?;
         }
         if let Some(path) = &args.stats {
-            stats::write(path, solved, *accuracy, times)?;
+            stats::write(path, solved, *accuracy, times, Spared::default())?;
         }
         Ok(())
     }

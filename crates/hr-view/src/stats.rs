@@ -1,6 +1,7 @@
 //! What `--stats` writes: times, counts, what was skipped and why.
 
 use crate::ViewError;
+use crate::raycast::Spared;
 use crate::solved::{Accuracy, Solved};
 use hr_diffuse::Spent;
 use hr_scene::whole_file::write_whole;
@@ -21,9 +22,9 @@ pub struct Times {
 
 /// The statistics of a solution as JSON. Phases do not overlap: `refine` is without the rays, which are `visibility`,
 /// and values at vertices are part of `display`. `error` is the relative error that the solution is believed to have,
-/// `asked` that which was asked for, `bias` the light that is missing (negative) or too much.
+/// `asked` that which was asked for, `bias` the light that is missing (negative) or too much. `spared` is what pictures did without.
 #[must_use]
-pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
+pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times, spared: Spared) -> Value {
     let solution = &solved.solution;
     let (stats, seconds, skipped) = (&solution.stats, &solution.stats.seconds, &solution.stats.skipped);
     let visibility = seconds.visibility.min(seconds.refine);
@@ -74,6 +75,8 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times) -> Value {
             "unseen_vertices": skipped.unseen_vertices,
             "unseen_leaves": skipped.unseen_leaves,
             "joined_leaves": skipped.joined_leaves,
+            "even_pixels": spared.even_pixels,
+            "smooth_pixels": spared.smooth_pixels,
             "shot_links": skipped.shot_links,
             "negligible_detail": solution.field.counters().negligible_detail(),
             "interpolated_samples": solution.field.counters().interpolated(),
@@ -101,8 +104,14 @@ pub fn peak_bytes() -> Option<u64> {
 }
 
 /// Writes the statistics of a solution.
-pub(crate) fn write(path: &Path, solved: &Solved, accuracy: Accuracy, times: &Times) -> Result<(), ViewError> {
-    let stats = stats(solved, accuracy, times);
+pub(crate) fn write(
+    path: &Path,
+    solved: &Solved,
+    accuracy: Accuracy,
+    times: &Times,
+    spared: Spared,
+) -> Result<(), ViewError> {
+    let stats = stats(solved, accuracy, times, spared);
     write_whole(path, |out| {
         serde_json::to_writer_pretty(&mut *out, &stats)?;
         writeln!(out)

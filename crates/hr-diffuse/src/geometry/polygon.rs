@@ -147,7 +147,8 @@ impl Quad {
     /// which exactly one root is within 0…1 for points inside a convex quadrilateral.
     pub(super) fn parameters_of(&self, point: Vec3) -> Vec2 {
         let [p0, p1, p2, p3] = self.points.map(|p| p.as_dvec3());
-        let x = (p1 - p0).try_normalize().unwrap_or((p2 - p3).normalize_or_zero());
+        // Of any length: what counts are ratios.
+        let x = if p1 == p0 { p2 - p3 } else { p1 - p0 };
         let y = self.normal.as_dvec3().cross(x);
         let flat = |v: DVec3| DVec2::new(v.dot(x), v.dot(y));
         let (e, f, g, h) = (flat(p1 - p0), flat(p3 - p0), flat(p0 - p1 + p2 - p3), flat(point.as_dvec3() - p0));

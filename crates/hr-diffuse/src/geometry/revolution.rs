@@ -17,6 +17,11 @@ const COSINE_SLACK: f32 = 1e-6;
 /// through where two surfaces abut: the rounding of positions to f32.
 const RIM: f64 = 2e-7;
 
+/// A line misses a ball of radius R (unit space) if it passes farther than √(`BALL_GROWTH` R² + `BALL_SLACK` (1 + l²)) from its centre,
+/// l the distance of the ray's origin: (R + e)² ≤ (1 + δ) R² + (1 + 1/δ) e², where rounding in f32 and [`RIM`] come to e² ≤ 3e-13 (1 + l²).
+const BALL_GROWTH: f32 = 1.05;
+const BALL_SLACK: f32 = 7e-12;
+
 /// A profile curve (ρ, h), v running 0…1: distance from the axis and height along it, in unit space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Profile {
@@ -40,6 +45,16 @@ pub enum Profile {
     },
 }
 
+impl Profile {
+    /// Height of the centre, and radius, of a ball that holds the surface.
+    fn ball(&self) -> (f32, f32) {
+        match *self {
+            Self::Line { from, to } => (0.5 * (from.y + to.y), (0.5 * (to.y - from.y)).hypot(from.x.max(to.x))),
+            Self::Arc { center, radius, .. } => (0.0, center + radius),
+        }
+    }
+}
+
 /// A surface of revolution in unit space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Revolution {
@@ -49,6 +64,8 @@ pub struct Revolution {
     profile: Profile,
     /// 1 or −1: the front is left or right of the profile's direction.
     side: f32,
+    /// Centre and radius of a ball that holds all of it.
+    ball: (Vec3, f32),
 }
 
 impl Revolution {
@@ -160,7 +177,10 @@ impl Revolution {
         let z = (axis / largest).normalize();
         let (x, y) = z.any_orthonormal_pair();
         let side = if flip { -1.0 } else { 1.0 };
-        let surface = Self { center: unit_center, frame: [x, y, z].map(|v| v.as_vec3()), profile, side };
+        let frame = [x, y, z].map(|v| v.as_vec3());
+        let (height, radius) = profile.ball();
+        let ball = (unit_center + frame[2] * height, radius);
+        let surface = Self { center: unit_center, frame, profile, side, ball };
         let area = surface.domain_area(Domain::WHOLE);
         if area < f32::MIN_POSITIVE {
             return Err(GeometryError::Vanishing);
@@ -463,22 +483,56 @@ impl Revolution {
         vec2(u as f32, v.clamp(0.0, 1.0) as f32)
     }
 
+    /// The nearest hit of a ray and its parameters.
     pub(super) fn intersect(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<(f32, Vec2)> {
-        // In f64 throughout: the quadratics and the quartic cancel where the surface is small and far.
-        let o = self.local(origin.as_dvec3() - self.center.as_dvec3());
-        let d = self.local(direction.as_dvec3());
+        let (o, d) = self.local_ray(origin, direction);
+        let t = self.first(o, d, t_min, t_max)?;
+        Some((t as f32, self.local_parameters(o + d * t)))
+    }
+
+    /// The nearest hit alone.
+    pub(super) fn distance(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<f32> {
+        if self.is_missed(origin, direction) {
+            return None;
+        }
+        let (o, d) = self.local_ray(origin, direction);
+        self.first(o, d, t_min, t_max).map(|t| t as f32)
+    }
+
+    /// Whether the line of a ray passes by at a distance: most that come near do.
+    #[inline]
+    fn is_missed(&self, origin: Vec3, direction: Vec3) -> bool {
+        let (center, radius) = self.ball;
+        let to = center - origin;
+        let near = BALL_GROWTH * radius * radius + BALL_SLACK * (1.0 + to.length_squared());
+        to.cross(direction).length_squared() > near * direction.length_squared()
+    }
+
+    /// A ray in the frame, in f64: the quadratics and the quartic cancel where the surface is small and far.
+    fn local_ray(&self, origin: Vec3, direction: Vec3) -> (DVec3, DVec3) {
+        (self.local(origin.as_dvec3() - self.center.as_dvec3()), self.local(direction.as_dvec3()))
+    }
+
+    fn first(&self, o: DVec3, d: DVec3, t_min: f32, t_max: f32) -> Option<f64> {
         let (low, high) = (f64::from(t_min), f64::from(t_max));
-        let candidates: SmallVec<[f64; 8]> = match self.profile {
-            Profile::Line { from, to } => line_hits(from.as_dvec2(), to.as_dvec2(), o, d),
+        match self.profile {
+            Profile::Line { from, to } => first_of(line_hits(from.as_dvec2(), to.as_dvec2(), o, d), low, high),
             Profile::Arc { center: 0.0, radius, .. } => {
                 let radius = f64::from(radius);
-                quadratic(d.length_squared(), o.dot(d), o.length_squared() - radius * radius)
+                let hits = quadratic(d.length_squared(), o.dot(d), o.length_squared() - radius * radius);
+                first_of(hits, low, high)
             }
-            Profile::Arc { center, radius, .. } => torus_hits(f64::from(center), f64::from(radius), o, d, low, high),
-        };
-        let t = candidates.into_iter().filter(|&t| t > low && t < high).fold(f64::INFINITY, f64::min);
-        t.is_finite().then(|| (t as f32, self.local_parameters(o + d * t)))
+            Profile::Arc { center, radius, .. } => {
+                first_of(torus_hits(f64::from(center), f64::from(radius), o, d, low, high), low, high)
+            }
+        }
     }
+}
+
+/// The least of some distances within a range; infinite ones and those that are no number are none.
+fn first_of(hits: impl IntoIterator<Item = f64>, low: f64, high: f64) -> Option<f64> {
+    let t = hits.into_iter().filter(|&t| t > low && t < high).fold(f64::INFINITY, f64::min);
+    t.is_finite().then_some(t)
 }
 
 /// Checks a radius and takes it to unit space.
@@ -522,31 +576,34 @@ fn range_on_arc(a: f64, b: f64, from: f32, to: f32) -> (f64, f64) {
     (low, high)
 }
 
-/// Roots of a t² + 2 b t + c, without cancellation.
-fn quadratic(a: f64, b: f64, c: f64) -> SmallVec<[f64; 8]> {
+/// No hit.
+const NONE: f64 = f64::INFINITY;
+
+/// Roots of a t² + 2 b t + c, without cancellation; what is no root is not finite.
+fn quadratic(a: f64, b: f64, c: f64) -> [f64; 2] {
     let discriminant = b * b - a * c;
     if discriminant < 0.0 || discriminant.is_nan() {
-        return SmallVec::new();
+        return [NONE; 2];
     }
     let q = -(b + discriminant.sqrt().copysign(b));
-    [q / a, c / q].into_iter().filter(|t| t.is_finite()).collect()
+    [q / a, c / q]
 }
 
-/// Hits of a ray with a line profile turned around z: a cone, cylinder or ring.
-fn line_hits(from: DVec2, to: DVec2, o: DVec3, d: DVec3) -> SmallVec<[f64; 8]> {
+/// Hits of a ray with a line profile turned around z: a cone, cylinder or ring. What is no hit is not finite.
+fn line_hits(from: DVec2, to: DVec2, o: DVec3, d: DVec3) -> [f64; 2] {
     let along = to - from;
     if along.y == 0.0 {
         let t = (from.y - o.z) / d.z;
         let radius = (o + d * t).truncate().length();
         let inside = radius >= from.x - RIM && radius <= to.x + RIM;
-        return if inside && t.is_finite() { SmallVec::from_slice(&[t]) } else { SmallVec::new() };
+        return [if inside { t } else { NONE }, NONE];
     }
     // With h = along.y: (hρ)² = (along.x z + from.x h)², z from the first end. The ray's numbers are relative to
     // its nearest point to the middle of the profile, which keeps b² − ac from cancelling for far origins.
     let middle = DVec3::new(0.0, 0.0, 0.5 * (from.y + to.y));
     let shift = (middle - o).dot(d) / d.length_squared();
     if !shift.is_finite() {
-        return SmallVec::new();
+        return [NONE; 2];
     }
     let p = o + d * shift;
     let (h, g) = (along.y, from.x * along.y + along.x * (p.z - from.y));
@@ -554,15 +611,13 @@ fn line_hits(from: DVec2, to: DVec2, o: DVec3, d: DVec3) -> SmallVec<[f64; 8]> {
     let a = h * h * d.truncate().length_squared() - slope * slope;
     let b = h * h * p.truncate().dot(d.truncate()) - slope * g;
     let c = h * h * p.truncate().length_squared() - g * g;
-    let mut hits = quadratic(a, b, c);
     let rim = RIM * h / along.length();
-    hits.retain(|t| {
-        let z = p.z + d.z * *t - from.y;
+    quadratic(a, b, c).map(|t| {
+        let z = p.z + d.z * t - from.y;
         // A little beyond the rim counts; the other nappe of the cone does not.
-        z >= -rim && z <= h + rim && from.x + along.x * (z / h) >= -RIM
-    });
-    hits.iter_mut().for_each(|t| *t += shift);
-    hits
+        let inside = z >= -rim && z <= h + rim && from.x + along.x * (z / h) >= -RIM;
+        if inside { t + shift } else { NONE }
+    })
 }
 
 /// Hits of a ray with a torus around z, within a range of t.
@@ -581,8 +636,19 @@ fn torus_hits(major: f64, minor: f64, o: DVec3, d: DVec3, low: f64, high: f64) -
         return SmallVec::new();
     }
     let scale = major / speed;
-    let first = ((low - shift) / scale).max(-reach.sqrt());
-    let last = ((high - shift) / scale).min(reach.sqrt());
+    // So do the planes above and below it: of a ray within these the quotients are infinite, or no numbers.
+    let thickness = r * (1.0 + RIM);
+    let planes = [(-thickness - p.z) / d.z, (thickness - p.z) / d.z];
+    let enters = planes[0].min(planes[1]);
+    let leaves = planes[0].max(planes[1]);
+    let first = ((low - shift) / scale).max(-reach.sqrt()).max(enters);
+    let last = ((high - shift) / scale).min(reach.sqrt()).min(leaves);
+    // Between these planes, what is nearer to the axis at both ends than the inside is so all along: the hole.
+    let hole = (1.0 - r) * (1.0 - RIM);
+    let misses = |t: f64| (p + d * t).truncate().length_squared() < hole * hole;
+    if misses(first) && misses(last) {
+        return SmallVec::new();
+    }
     // (|p|² + 1 − r²)² = 4 (x² + y²) with p + t d and p·d = 0: |p|² = t² + |p₀|².
     let k = p.length_squared() + 1.0 - r * r;
     let (flat_p, flat_d) = (p.truncate(), d.truncate());

@@ -219,7 +219,7 @@ proptest! {
         }
         let uv = geometry.domain_point(domain, s, t);
         prop_assert!(geometry.contains(domain, uv), "a part's point is in it");
-        let child = children[geometry.locate(&children, uv)];
+        let child = children[geometry.locate(children.iter().copied(), uv)];
         let nearest = vec2(uv.x + 1e-7, uv.y + 1e-7).max(Vec2::ZERO);
         prop_assert!(geometry.contains(child, uv) || geometry.contains(child, nearest), "{uv} in {child:?}");
         // Deterministic, and no child is the parent again.

@@ -319,7 +319,7 @@ fn hits_locate_the_part() {
     for (i, child) in children.iter().enumerate() {
         let target = surface.point(child.lerp(0.4, 0.6));
         let hit = visibility.closest(target + vec3(0.1, 0.2, 0.5), vec3(-0.1, -0.2, -0.5), 0.0, 2.0).expect("hit");
-        assert_eq!(surface.locate(&children, hit.uv), i, "part {i} at {}", hit.uv);
+        assert_eq!(surface.locate(children.iter().copied(), hit.uv), i, "part {i} at {}", hit.uv);
     }
 }
 
