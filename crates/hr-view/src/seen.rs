@@ -64,15 +64,16 @@ mod tests {
         let mut camera = scene.default_camera();
         (camera.width, camera.height) = (120, 80);
         let cameras = [camera];
+        let solve = |purpose| {
+            let settings = Settings::with_error(ERROR);
+            let asked = Solved::awaited(Arc::clone(&scene), settings, purpose, &mut |_| Wanted::Whole);
+            asked.expect("a sound scene").0.solution
+        };
+        let all = solve(Purpose { distributions: true, cameras: None });
         for mode in [Mode::Samples, Mode::Distributions] {
-            let [(all, one), (some, other)] = [None, Some(&cameras[..])].map(|cameras| {
-                let purpose = Purpose { distributions: mode == Mode::Distributions, cameras };
-                let settings = Settings::with_error(ERROR);
-                let asked = Solved::awaited(Arc::clone(&scene), settings, purpose, &mut |_| Wanted::Whole);
-                let solved = asked.expect("a sound scene").0;
-                let picture = RayCaster::new(&scene, &solved.solution, mode).render(&camera, &|_| ());
-                (solved.solution, picture)
-            });
+            let some = solve(Purpose { distributions: mode == Mode::Distributions, cameras: Some(&cameras) });
+            let [one, other] =
+                [&all, &some].map(|solution| RayCaster::new(&scene, solution, mode).render(&camera, &|_| ()));
             let unseen = some.stats.skipped.unseen_vertices as usize;
             assert_eq!(all.stats.skipped.unseen_vertices, 0, "from anywhere all may be seen");
             assert!(2 * unseen > some.vertices.positions.len(), "{unseen} of {}", some.vertices.positions.len());
