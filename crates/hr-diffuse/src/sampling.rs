@@ -7,8 +7,10 @@ use std::f32::consts::TAU;
 /// Steps of the four-dimensional additive recurrence: powers of the reciprocal of the root of x⁵ = x + 1
 /// (M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
 const STEPS: Vec4 = Vec4::new(0.856_674_9, 0.733_891_9, 0.628_706_7, 0.538_597_3);
-/// The same in two dimensions: x³ = x + 1.
+/// The same in two dimensions: x³ = x + 1, …
 const PLANE_STEPS: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
+/// … and in one, x² = x + 1, of 2³².
+const LINE_STEP: u32 = 0x9E37_79B9;
 
 /// A well-mixed 32-bit hash of two numbers (the finaliser of MurmurHash3).
 #[must_use]
@@ -39,6 +41,12 @@ pub fn point4(seed: u32, i: u32) -> Vec4 {
 pub fn point2(seed: u32, i: u32) -> Vec2 {
     let shift = Vec2::new(unit(hash(seed, 5)), unit(hash(seed, 6)));
     (shift + PLANE_STEPS * i as f32).fract()
+}
+
+/// The `i`-th number in 0…1 for a seed.
+#[must_use]
+pub fn number(seed: u32, i: u32) -> f32 {
+    unit(hash(seed, 7).wrapping_add(i.wrapping_mul(LINE_STEP)))
 }
 
 /// A direction about a unit normal, drawn by its cosine.

@@ -5,7 +5,7 @@ use crate::footprint::Spot;
 use crate::geometry::{Domain, Geometry};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
 use crate::hooks::LightField;
-use crate::sampling::{hash, point2, point4, unit};
+use crate::sampling::{hash, number, point2, point4, unit};
 use crate::transport::{Exitant, Light};
 use crate::visibility::Proof;
 use glam::{Vec2, Vec3};
@@ -322,9 +322,9 @@ pub(crate) fn visibility_at<L: LightField>(
     }
     let seed = hash(seed, sender);
     let segment = |i: u32, attempt: u32| {
-        let (index, round) = (i + attempt * 0x1_0000, seed ^ attempt.wrapping_mul(0x9E37));
-        let (choice, (x, n, surface)) = (unit(hash(round ^ 0x68e3, i)), from(i));
-        let s = draw(scene, elements, sender, (choice, point2(seed, index)), Density::Power(exitant), Some(x))?;
+        let (index, (x, n, surface)) = (i + attempt * 0x1_0000, from(i));
+        let drawn = (number(seed, index), point2(seed, index));
+        let s = draw(scene, elements, sender, drawn, Density::Power(exitant), Some(x))?;
         between((x, n, surface), &s, s)
     };
     let segments = (0..count).filter_map(|i| (0..TRIES).find_map(|attempt| segment(i, attempt)));
