@@ -306,6 +306,22 @@ proptest! {
         }
     }
 
+    /// What is passed by is not hit: rays to points of a surface, or just beside them, from near and from afar.
+    #[test]
+    fn distances_are_those_of_hits(
+        surface in surface(),
+        (s, t) in (0f32..1.0, 0f32..1.0),
+        (away, beside) in (direction(), direction()),
+        (far, off) in (-2.0f32..2.0, -7.0f32..0.0),
+    ) {
+        let geometry = geometry(&surface);
+        let (point, _) = geometry.sample(Domain::WHOLE, s, t);
+        let origin = point + away.as_vec3() * 10f32.powf(far);
+        let direction = point + beside.as_vec3() * 10f32.powf(off) - origin;
+        let hit = geometry.intersect(origin, direction, 0.0, 4.0);
+        prop_assert_eq!(geometry.distance(origin, direction, 0.0, 4.0), hit.map(|hit| hit.0));
+    }
+
     #[test]
     fn a_shared_edge_has_the_same_points_on_both_sides(
         a in position(), b in position(), c in position(), d in position(), e in position(), step in 0u32..=256,
