@@ -5,7 +5,7 @@
 //! tells apart, which emitters are seen from it and how much each of them brings. Draws follow that; a share of
 //! them goes by power alone, so that nothing is missed whose rays were all blocked.
 
-use super::emitters::Emitters;
+use super::emitters::{Arrival, Emitters};
 use glam::{Vec2, Vec3};
 use hr_diffuse::sampling::{hash, point2};
 use hr_diffuse::visibility::NO_BLOCKER;
@@ -19,6 +19,25 @@ const LOOKED_AT: usize = 64;
 const BELIEVED: f32 = 0.25;
 /// Rays to each of them.
 const RAYS: u32 = 8;
+/// Where a shadow ends within a place, an emitter is seen from next to its rim only: one that no ray found is looked for there, too, if it
+/// would bring at least this share of all were nothing between, …
+const STRONG: f32 = 0.05;
+/// … by so many rays …
+const RIM_RAYS: usize = 3;
+/// … from each of these points.
+const RIM: [Vec2; 8] = {
+    let [low, middle, high] = [0.02, 0.5, 0.98];
+    [
+        Vec2::new(low, low),
+        Vec2::new(high, high),
+        Vec2::new(low, high),
+        Vec2::new(high, low),
+        Vec2::new(low, middle),
+        Vec2::new(high, middle),
+        Vec2::new(middle, low),
+        Vec2::new(middle, high),
+    ]
+};
 /// Emitters that bring less than this share of what is seen are too many to look at each of them.
 const MUCH: f32 = 0.01;
 /// Of an emitter that no ray found so much is believed to be seen.
@@ -58,46 +77,76 @@ struct Found {
     seen: f32,
 }
 
+/// Looks for emitters from a place.
+struct Look<'a> {
+    emitters: &'a Emitters,
+    visibility: &'a Visibility,
+    place: &'a Place,
+    seed: u32,
+}
+
+impl Look<'_> {
+    /// A point of the place and the normal on its side.
+    fn point(&self, u: Vec2) -> (Vec3, Vec3) {
+        let (point, front) =
+            self.visibility.geometries()[self.place.surface as usize].sample(self.place.domain, u.x, u.y);
+        (point, if self.place.back { -front } else { front })
+    }
+
+    /// What a point of an emitter, its `k`-th, brings to a point of the place, sum of channels.
+    fn brings(&self, entry: u32, (at, normal): (Vec3, Vec3), k: u32) -> Option<(f32, Arrival)> {
+        let u = point2(hash(self.seed, 1 + entry), k);
+        let arrival = self.emitters.shine(self.visibility.geometries(), at, entry, u, 1.0)?;
+        let cosine = arrival.direction.dot(normal);
+        (cosine > 0.0).then(|| (arrival.irradiance.element_sum() * cosine.max(LEAST_COSINE), arrival))
+    }
+
+    /// What an emitter brings to points, were nothing between, and what of that is seen; points of the emitter are its `first` and those
+    /// after it.
+    fn shines(&self, entry: u32, points: impl Iterator<Item = (Vec3, Vec3)>, first: u32) -> [f32; 2] {
+        let [mut all, mut open] = [0.0; 2];
+        for (point, k) in points.zip(first..) {
+            let Some((brought, arrival)) = self.brings(entry, point, k) else { continue };
+            all += brought;
+            let ends = [self.place.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
+            if !self.visibility.occluded(point.0, arrival.from, ends, &mut { NO_BLOCKER }) {
+                open += brought;
+            }
+        }
+        [all, open]
+    }
+}
+
 impl Nearby {
     /// Looks for them by rays.
     #[must_use]
     pub fn new(emitters: &Emitters, visibility: &Visibility, place: &Place, seed: u32) -> Self {
-        let geometries = visibility.geometries();
-        let points: [_; RAYS as usize] = std::array::from_fn(|k| {
-            let u = point2(hash(seed, 0), k as u32);
-            let (point, front) = geometries[place.surface as usize].sample(place.domain, u.x, u.y);
-            (point, if place.back { -front } else { front })
-        });
-        // Sum of the channels of what an emitter brings to a point.
-        let brings = |entry: u32, (at, normal): (Vec3, Vec3), u: Vec2| {
-            let arrival = emitters.shine(geometries, at, entry, u, 1.0)?;
-            let cosine = arrival.direction.dot(normal);
-            (cosine > 0.0).then(|| (arrival.irradiance.element_sum() * cosine.max(LEAST_COSINE), arrival))
-        };
+        let look = Look { emitters, visibility, place, seed };
+        let points: [_; RAYS as usize] = std::array::from_fn(|k| look.point(point2(hash(seed, 0), k as u32)));
+        let rim = RIM.map(|u| look.point(u));
         let is_mesh = emitters.len() > LOOKED_AT;
         let unblocked = |entry: u32| {
             // Parts that glow are many and small, and so are polygons of lamps that are meshes; of what is round half may face away.
-            let is_small = emitters.is_glowing(entry) || is_mesh && emitters.is_flat(entry, geometries);
+            let is_small = emitters.is_glowing(entry) || is_mesh && emitters.is_flat(entry, visibility.geometries());
             let looks = if is_small { 2 } else { RAYS };
-            let light =
-                |k: u32| brings(entry, points[k as usize], point2(hash(seed, 1 + entry), k)).map(|(light, _)| light);
+            let light = |k: u32| look.brings(entry, points[k as usize], k).map(|(light, _)| light);
             (0..looks).filter_map(light).sum::<f32>() / looks as f32
         };
         let mut found: Vec<_> =
             (0..emitters.len() as u32).map(|entry| Found { entry, light: unblocked(entry), seen: BELIEVED }).collect();
         found.sort_by(|a, b| b.light.total_cmp(&a.light));
+        let strong = STRONG * found.iter().map(|found| found.light).sum::<f32>();
         for Found { entry, light, seen } in found.iter_mut().take(LOOKED_AT) {
-            let (mut all, mut open) = (0.0, 0.0);
-            for (k, &point) in points.iter().enumerate() {
-                let drawn = brings(*entry, point, point2(hash(seed, 1 + *entry), k as u32));
-                let Some((brought, arrival)) = drawn else { continue };
-                all += brought;
-                let ends = [place.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
-                if !visibility.occluded(point.0, arrival.from, ends, &mut { NO_BLOCKER }) {
-                    open += brought;
-                }
+            let [mut all, mut open] = look.shines(*entry, points.into_iter(), 0);
+            *light = all / RAYS as f32;
+            if open == 0.0 && *light >= strong {
+                let more = look.shines(*entry, rim.iter().flat_map(|&point| [point; RIM_RAYS]), RAYS);
+                [all, open] = [all + more[0], open + more[1]];
             }
-            (*light, *seen) = (all / RAYS as f32, if all > 0.0 { (open / all).max(LEAST_SEEN) } else { BELIEVED });
+            if all > 0.0 {
+                // What any ray found is surely seen.
+                *seen = if open > 0.0 { (open / all).max(1.0 / RAYS as f32) } else { LEAST_SEEN };
+            }
         }
         for Found { light, seen, .. } in &mut found {
             *light *= *seen;
@@ -198,5 +247,27 @@ mod tests {
         let [strong, weak] =
             [2, 3].map(|surface| chances[tracer.emitters().of_surface(surface).expect("it shines") as usize]);
         assert!(weak > strong, "hidden: {strong}, seen: {weak}");
+    }
+
+    #[test]
+    fn an_emitter_that_is_seen_from_the_rim_of_a_place_only_is_found() {
+        let mut scene = hidden_lamp();
+        let square = |height: f64, [low, high]: [f64; 2]| {
+            let p = |x: f64, y: f64| glam::dvec3(low + x * (high - low), low + y * (high - low), height);
+            hr_diffuse::Shape::Quad([p(0.0, 0.0), p(1.0, 0.0), p(1.0, 1.0), p(0.0, 1.0)])
+        };
+        // The shadow of the plate ends just before two edges of the ground.
+        scene.surfaces[0].shape = square(0.0, [-1.0, 1.0]);
+        scene.surfaces[1].shape = square(0.5, [-1.0, 0.485]);
+        scene.surfaces[2].shape = square(1.0, [-0.1, 0.1]);
+        scene.surfaces.truncate(3);
+        let rays = visibility(&scene).expect("sound");
+        let tracer = PathTracer::new(&scene, &rays);
+        let ground = Place { surface: 0, domain: Domain::WHOLE, back: false };
+        let lamp = tracer.emitters().of_surface(2).expect("it shines");
+        for seed in 0..40 {
+            let seen = Nearby::new(tracer.emitters(), &rays, &ground, seed).seen(lamp);
+            assert!(seen > LEAST_SEEN, "seed {seed}: {seen}");
+        }
     }
 }
