@@ -561,6 +561,23 @@ mod tests {
         assert!(incident.len() <= 1 + 4 + 36, "walls are merged: {} samples", incident.len());
     }
 
+    /// A floor from above it, and from the side: disks in the place of its parts would leave gaps between them.
+    #[test]
+    fn parts_of_wide_senders_have_outlines() {
+        for taper in [0.0, 1.0] {
+            let sides = Sides { across: Vec3::new(2.0, 0.5, 0.0), along: Vec3::new(-0.3, 1.0, 0.0), taper };
+            let floor = FlatPart { center: Vec3::new(0.4, 0.2, 0.0), sides };
+            for at in [Vec3::new(0.5, 0.1, 0.15), Vec3::new(0.2, -0.1, 0.4), Vec3::new(-1.5, 0.0, 0.6)] {
+                let (place, mut parts) = (Place::new(at, Vec3::NEG_Z), 0);
+                floor.divided(at, |part| {
+                    parts += 1;
+                    assert!(contour(&part, &place).reach() > 0.0, "{part:?} from {at}");
+                });
+                assert!(parts > 4, "{parts} parts from {at}");
+            }
+        }
+    }
+
     /// A lamp above a leaf, which a fourth of something larger sees, and what is really seen of it.
     struct Seen {
         /// Irradiance that a look finds.

@@ -182,8 +182,8 @@ pub struct Arrived {
     pub irradiance: Rgb,
     /// Diffuse radiance that the leaf makes of it, W/(m² sr).
     pub diffuse: Rgb,
-    /// The leaf stands for others, too, whose normals are within this angle (radians) of its own: detail finer than what
-    /// that makes of a reflection is lost.
+    /// The leaf sends light for others, too, whose normals are within this angle (radians) of its own: detail finer than what
+    /// that makes of a reflection is lost. 0 where what it shows is turned by the normal of each place.
     pub spread: f32,
     /// Differences of the leaf's exitant light by less than this, W/(m² sr), make no difference to what is asked for: 0
     /// where everything counts.

@@ -18,7 +18,6 @@ use crate::solver::{Phase, Progress, Solver, Transport};
 use crate::threads::{self, prelude::*};
 use crate::vertices::outlines;
 use crate::{Cone, Rgb};
-use glam::Vec2;
 use smallvec::SmallVec;
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::ops::ControlFlow;
@@ -498,7 +497,8 @@ impl<L: LightField> Solver<L> {
         let count = glossy.len();
         let leaves: Vec<u32> = glossy.into_iter().filter(|&leaf| wanted[leaf as usize]).collect();
         self.stats.skipped.unseen_leaves = (count - leaves.len()) as u64;
-        self.reflect_closely(&leaves, &faces, watch);
+        // Whoever looks turns what he sees by the normal of the place: no other normals blur it.
+        self.reflect_closely(&leaves, &vec![0.0; leaves.len()], watch);
     }
 
     /// The same for flat leaves that stand for senders and are not shown so yet: vertices near by see more of their lobes than links tell
@@ -518,27 +518,29 @@ impl<L: LightField> Solver<L> {
             wanted[*leaf as usize] && is_flat
         };
         let leaves: Vec<u32> = self.elements.patch_leaves().filter(is_wanted).collect();
-        self.reflect_closely(&leaves, &self.face_clusters(), watch);
+        let faces = self.face_clusters();
+        let spreads: Vec<f32> = leaves.iter().map(|&leaf| faces.spread(&self.elements, leaf)).collect();
+        self.reflect_closely(&leaves, &spreads, watch);
     }
 
-    /// Reflects the incident light of leaves as closely as they are looked at.
+    /// Reflects the incident light of leaves as closely as they are looked at; given, by leaf, the angles within which the normals are that
+    /// what they reflect stands for.
     fn reflect_closely(
         &mut self,
         leaves: &[u32],
-        faces: &FaceClusters,
+        spreads: &[f32],
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) {
         let start = Instant::now();
         let shown = SHOWN_SHARE * self.settings.error * self.mean_irradiance() * FRAC_1_PI;
         let negligible = if self.skips.negligible_detail { shown } else { 0.0 };
         let errors = self.skips.negligible_detail.then(|| self.link_errors());
-        let standing = |&leaf: &u32| {
-            let spread = self.bend(leaf).max(faces.spread(&self.elements, leaf));
+        let standing = |(&leaf, &spread): (&u32, &f32)| {
             let error =
                 errors.as_ref().map_or(self.settings.error, |errors| self.shown_error(leaf, errors[leaf as usize]));
             Standing { leaf, spread, negligible, error }
         };
-        let leaves: Vec<Standing> = leaves.iter().map(standing).collect();
+        let leaves: Vec<Standing> = leaves.iter().zip(spreads).map(standing).collect();
         let progress = self.progress(Phase::Transport, 0.9);
         let (mut done, mut stopped) = (0, false);
         let chunk = BETWEEN_WATCHES * threads::current_num_threads();
@@ -606,17 +608,6 @@ impl<L: LightField> Solver<L> {
         let irradiance = self.exitant.irradiance[leaf as usize].max_element().max(f32::MIN_POSITIVE);
         let [least, most] = SHOWN_ERROR;
         (by_links / irradiance).clamp(least.min(self.settings.error), most)
-    }
-
-    /// Angle by which the shading normals of a leaf's surface turn away from the surface: it is a piece of something
-    /// smooth, and detail finer than that belongs to no place on it.
-    fn bend(&self, leaf: u32) -> f32 {
-        let element = &self.elements.nodes[leaf as usize];
-        let normal = self.scene.surfaces()[element.source as usize].normal(Vec2::splat(0.25));
-        let shading = self.scene.shading_normals[element.source as usize].as_ref();
-        shading.map_or(0.0, |normals| {
-            normals.iter().map(|n| n.normalize_or(normal).dot(normal).clamp(0.0, 1.0).acos()).fold(0.0, f32::max)
-        })
     }
 }
 

@@ -7,6 +7,7 @@ use hr_scene::{Camera, Image, Material, Rgb, Scene};
 use hr_view::Mode;
 use hr_view::raycast::RayCaster;
 use hr_view::solved::Solved;
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -98,4 +99,48 @@ fn rays_of_a_pixel_see_what_its_middle_shows() {
     });
     let off = difference(&means(&shared, 2), &means(&apart, 6));
     assert!(off < 0.005, "{off} of the light");
+}
+
+/// A polished ball of few facets, which are shown round, on a floor between walls.
+fn ball(facets: u32) -> Arc<Scene> {
+    let mut scene =
+        Scene::clone(&floor(1, MetallicRoughness::new(Rgb::new(0.9, 0.8, 0.6), 1.0, 0.2).expect("a metal")));
+    let (z, center, radius) = (DVec3::Z, DVec3::new(1.0, 1.2, 0.35), 0.3);
+    // The floor is a wall's; the other wall is behind the eye.
+    scene.surfaces[0].material = WALL;
+    scene.surfaces.push(quad(DVec3::ZERO, z, DVec3::X * 2.0, WALL));
+    let normal = |i: u32, k: u32| {
+        let [polar, around] = [(i, 1.0), (k, 2.0)].map(|(n, turns)| turns * PI * f64::from(n) / f64::from(facets));
+        DVec3::new(polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos())
+    };
+    for (i, k) in (0..facets).flat_map(|i| (0..facets).map(move |k| (i, k))) {
+        let normals = [(i, k), (i + 1, k), (i + 1, k + 1), (i, k + 1)].map(|(i, k)| normal(i, k));
+        let corners = normals.map(|normal| center + normal * radius);
+        let shape = match i {
+            0 => Shape::Triangle([corners[0], corners[1], corners[2]]),
+            _ if i + 1 == facets => Shape::Triangle([corners[0], corners[1], corners[3]]),
+            _ => Shape::Quad(corners),
+        };
+        let mut shading = normals.map(|normal| normal.as_vec3());
+        if i + 1 == facets {
+            shading[2] = shading[3];
+        }
+        scene.surfaces.push(Surface { shading_normals: Some(shading), ..Surface::new(shape, GLOSSY) });
+    }
+    Arc::new(scene.finish().expect("a sound scene"))
+}
+
+/// Distributions of facets are turned by the normal of the place that is seen: they show what is around as sharply as the rays that
+/// pictures follow.
+#[test]
+fn facets_that_are_shown_round_mirror_sharply() {
+    let solved = solved(&ball(12));
+    let camera = Camera { eye: [1.0, 0.3, 0.5], target: [1.0, 1.2, 0.35], fov_x: 40.0, ..camera(96) };
+    let [distributions, rays] = [Mode::Distributions, Mode::Samples].map(|mode| {
+        let caster = RayCaster::new(&solved.scene, &solved.solution, mode).with_grid(2);
+        means(&caster.render(&camera, &|_| ()), 4)
+    });
+    let off = difference(&rays, &distributions);
+    // 40 % are off where normals of whole facets blur them.
+    assert!(off < 0.1, "{off} of the light");
 }
