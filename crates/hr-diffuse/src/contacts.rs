@@ -7,14 +7,21 @@
 //!
 //! The floors of two rooms may be two polygons that end at the wall between them: there nothing is cut, but leaves on one side of the
 //! wall share no vertices with those on the other.
+//!
+//! The shadow of a light without extent ends at a line as well ([`shadow_lines`]).
+
+mod shadow_lines;
 
 use crate::geometry::Geometry;
 use crate::hierarchy::{Element, Elements, SceneData};
+use crate::hooks::LightField;
 use crate::sealed::outward;
 use crate::threads::prelude::*;
+use crate::transport::Light;
 use crate::vertices::{Corner, INSET, Layout, Outline, Vertices};
 use crate::visibility::Region;
 use glam::{Vec2, Vec3};
+use shadow_lines::ShadowLines;
 use smallvec::{SmallVec, smallvec};
 use std::collections::HashMap;
 
@@ -44,6 +51,24 @@ struct Contact {
 }
 
 impl Contact {
+    /// The plane through a line in one with a normal, at right angles to that; none where the line is a point.
+    fn through([from, to]: [Vec3; 2], normal: Vec3) -> Option<Self> {
+        let across = normal.cross(to - from).try_normalize()?;
+        Some(Self { normal: across, height: from.dot(across), beside: false }.turned())
+    }
+
+    /// The same, of the two normals that it may have with the one that all have.
+    fn turned(self) -> Self {
+        let sign = self.normal.to_array().into_iter().find(|c| c.abs() > 1e-3).map_or(1.0, f32::signum);
+        Self { normal: self.normal * sign, height: self.height * sign, ..self }
+    }
+
+    /// Whether another one is the same for a leaf with these corners, to `near`.
+    fn is_like(&self, other: &Self, corners: &[Vec3], near: f32) -> bool {
+        self.normal.dot(other.normal) > PARALLEL
+            && corners.iter().all(|x| (self.above(*x) - other.above(*x)).abs() < near)
+    }
+
     /// How far in front of the plane a point is.
     fn above(&self, x: Vec3) -> f32 {
         x.dot(self.normal) - self.height
@@ -54,16 +79,33 @@ impl Contact {
 #[derive(Debug, Default)]
 pub(crate) struct Contacts {
     of: HashMap<u32, SmallVec<[Contact; MOST_LINES]>>,
+    /// Rays that were shot to find them.
+    pub(crate) rays: u64,
 }
 
 impl Contacts {
-    /// Finds what meets each leaf.
-    pub(crate) fn new(scene: &SceneData, elements: &Elements, layout: &Layout) -> Self {
+    /// Finds what meets each leaf, and where shadows end on it.
+    pub(crate) fn new<L: LightField>(light: Light<'_, L>, layout: &Layout) -> Self {
+        let Light { scene, elements, .. } = light;
         let look = |(leaf, _): &(u32, Outline)| contacts(scene, elements, *leaf);
         let mut found: Vec<_> = layout.parts.par_iter().with_min_len(64).map(look).collect();
         part(elements, layout, &mut found);
+        let shadows = ShadowLines::new(light);
+        let add = |((leaf, outline), contacts): (&(u32, Outline), &mut SmallVec<[Contact; MOST_LINES]>)| {
+            let (lines, rays) = shadows.on(*leaf, outline);
+            let at = |corner: &Corner| layout.vertices.positions[corner.vertex as usize];
+            let corners: SmallVec<[Vec3; 12]> = outline.iter().map(at).collect();
+            let near = ON * elements.nodes[*leaf as usize].radius;
+            for line in lines {
+                if contacts.len() < MOST_LINES && !contacts.iter().any(|other| line.is_like(other, &corners, near)) {
+                    contacts.push(line);
+                }
+            }
+            rays
+        };
+        let rays = layout.parts.par_iter().zip(&mut found).with_min_len(64).map(add).sum();
         let of = layout.parts.iter().map(|(leaf, _)| *leaf).zip(found);
-        Self { of: of.filter(|(_, contacts)| !contacts.is_empty()).collect() }
+        Self { of: of.filter(|(_, contacts)| !contacts.is_empty()).collect(), rays }
     }
 
     /// Cuts leaves along the lines.
@@ -191,11 +233,8 @@ fn contacts(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Cont
     found.sort_by_key(|(other, contact)| (contact.beside, *other));
     let mut contacts: SmallVec<[Contact; MOST_LINES]> = SmallVec::new();
     for (_, contact) in found {
-        let same = |other: &Contact| {
-            contact.normal.dot(other.normal) > PARALLEL
-                && outline.iter().all(|x| (contact.above(*x) - other.above(*x)).abs() < ON * element.radius)
-        };
-        if contacts.len() < MOST_LINES && !contacts.iter().any(same) {
+        let near = ON * element.radius;
+        if contacts.len() < MOST_LINES && !contacts.iter().any(|other| contact.is_like(other, &outline, near)) {
             contacts.push(contact);
         }
     }
@@ -212,8 +251,7 @@ fn contact(surface: &Geometry, geometry: &Geometry, (normal, near): (Vec3, f32))
         return None;
     }
     let beside = low > height - near || high < height + near;
-    let sign = plane.to_array().into_iter().find(|c| c.abs() > 1e-3).map_or(1.0, f32::signum);
-    Some(Contact { normal: plane * sign, height: height * sign, beside })
+    Some(Contact { normal: plane, height, beside }.turned())
 }
 
 /// Where a polygon that reaches down to a height along a direction, or below it, is cut by the plane there.

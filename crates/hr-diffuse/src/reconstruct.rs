@@ -74,7 +74,7 @@ pub(crate) fn reconstruct<L: LightField>(
     watch: &mut dyn FnMut(f32) -> ControlFlow<()>,
 ) -> (Vertices, Cost) {
     let mut layout = outlines_of_parts(light.scene, light.elements, (&light.exitant.irradiance, error));
-    let contacts = Contacts::new(light.scene, light.elements, &layout);
+    let contacts = Contacts::new(light, &layout);
     contacts.cut(light.elements, &mut layout);
     let mut vertices = layout.fans(light.scene, light.elements);
     let places = contacts.places(light.elements, &vertices);
@@ -86,7 +86,7 @@ pub(crate) fn reconstruct<L: LightField>(
     };
     let is_seen: Vec<bool> = (0..count as u32).map(is_seen).collect();
     let gathers = |vertex: u32| is_seen[vertex as usize] && !within.holds(vertex);
-    let mut rays = 0;
+    let mut rays = contacts.rays;
     let chunk = BETWEEN_WATCHES * threads::current_num_threads();
     let mut covered = Vec::with_capacity(count);
     let mut sights = Vec::new();

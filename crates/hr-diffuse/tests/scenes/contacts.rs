@@ -17,12 +17,12 @@ const SHELVES: [[DVec2; 2]; 3] = [
     [DVec2::new(0.3, 1.93), DVec2::new(1.7, 1.93)],
 ];
 
-/// A wall with a black shelf on it, a bulb above.
-fn solution([a, b]: [DVec2; 2], depth: f64) -> Solution {
+/// A wall with a black shelf on it or before it, which begins and ends so far from it; a bulb above.
+fn solution([a, b]: [DVec2; 2], [near, far]: [f64; 2], error: f32) -> Solution {
     let at = |p: DVec2, y: f64| DVec3::new(p.x, y, p.y);
     let (x, z) = (DVec3::X * SIDE, DVec3::Z * SIDE);
     let wall = Shape::Quad([DVec3::ZERO, z, z + x, x]);
-    let shelf = Shape::Quad([at(a, 0.0), at(b, 0.0), at(b, depth), at(a, depth)]);
+    let shelf = Shape::Quad([at(a, near), at(b, near), at(b, far), at(a, far)]);
     let material = |reflectance| DiffuseMaterial { reflectance, exitance: Rgb::ZERO, two_sided: true };
     let input = SceneInput {
         surfaces: vec![Surface::new(wall, 0), Surface::new(shelf, 1)],
@@ -30,7 +30,7 @@ fn solution([a, b]: [DVec2; 2], depth: f64) -> Solution {
         lights: vec![Light { position: BULB, intensity: Rgb::ONE, kind: LightKind::Point }],
         ..SceneInput::default()
     };
-    let mut solver = Solver::new(&input, Settings::with_error(0.1), ()).expect("the scene is sound");
+    let mut solver = Solver::new(&input, Settings::with_error(error), ()).expect("the scene is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
     solver.finish(&mut |_| ControlFlow::Continue(()))
 }
@@ -54,7 +54,7 @@ fn share(solution: &Solution, at: DVec2) -> f64 {
 fn light_ends_where_surfaces_meet() {
     const PLACES: u32 = 400;
     for (shelf @ [a, b], most) in SHELVES.into_iter().zip([0, 32, 0]) {
-        let solution = solution(shelf, DEPTH);
+        let solution = solution(shelf, [0.0, DEPTH], 0.1);
         let up = (b - a).normalize().perp();
         let mut wrong = 0;
         for i in 0..PLACES {
@@ -70,13 +70,45 @@ fn light_ends_where_surfaces_meet() {
     }
 }
 
+/// The same along the edges of the shadow that a shelf throws which does not touch the wall, however coarse the solution is.
+#[test]
+fn shadows_end_at_lines() {
+    const PLACES: u32 = 400;
+    const NEAR: f64 = 0.1;
+    const FAR: f64 = 0.15;
+    for (shelf, most) in SHELVES[..2].iter().zip([0, 16]) {
+        let solution = solution(*shelf, [NEAR, FAR], 0.9);
+        for (y, outward) in [(NEAR, 1.0), (FAR, -1.0)] {
+            // Seen from the bulb, on the wall.
+            let thrown = |end: DVec2| {
+                let bulb = DVec2::new(BULB.x, BULB.z);
+                bulb + (end - bulb) * (BULB.y / (BULB.y - y))
+            };
+            let [a, b] = shelf.map(thrown);
+            let up = (b - a).normalize().perp() * outward;
+            let mut wrong = 0;
+            for i in 0..PLACES {
+                let on = a.lerp(b, 0.1 + 0.8 * f64::from(i) / f64::from(PLACES - 1));
+                let is_wrong = [0.01, 0.03].iter().any(|apart| {
+                    let [lit, dark] = [1.0, -1.0].map(|side| on + up * (side * apart));
+                    let is_on_wall = |at: DVec2| at.min_element() > 0.0 && at.max_element() < SIDE;
+                    is_on_wall(lit) && (share(&solution, lit) - 1.0).abs() > 0.1
+                        || is_on_wall(dark) && share(&solution, dark) > 0.1
+                });
+                wrong += u32::from(is_wrong);
+            }
+            assert!(wrong <= most, "{wrong} of {PLACES} places along the edge {y} off the wall, {shelf:?}");
+        }
+    }
+}
+
 /// A shadow that is narrower than leaves takes away as much light as it should, and not where vertices lie in it all of what is
 /// around them.
 #[test]
 fn narrow_shadows_are_as_dark_as_they_are_wide() {
     const LOW: f64 = 0.3;
     let shelf @ [a, b] = SHELVES[0];
-    let solution = solution(shelf, FRAME);
+    let solution = solution(shelf, [0.0, FRAME], 0.1);
     let (mut off, mut all, mut shown, mut there) = (0.0, 0.0, 0.0, 0.0);
     for i in 0..200 {
         let on = a.lerp(b, 0.1 + 0.8 * f64::from(i) / 199.0);
@@ -96,8 +128,8 @@ fn narrow_shadows_are_as_dark_as_they_are_wide() {
 /// Whatever is cut, the parts make up the whole.
 #[test]
 fn parts_fill_the_wall() {
-    for shelf in SHELVES {
-        let solution = solution(shelf, DEPTH);
+    for (shelf, near) in SHELVES.into_iter().flat_map(|shelf| [(shelf, 0.0), (shelf, 0.1)]) {
+        let solution = solution(shelf, [near, near + DEPTH], 0.1);
         let (mut area, mut fans) = (0.0, [0, 0]);
         for leaf in solution.elements.patch_leaves() {
             let element = &solution.elements.nodes[leaf as usize];
