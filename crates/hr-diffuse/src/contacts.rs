@@ -93,6 +93,9 @@ impl Contacts {
         let shadows = ShadowLines::new(light);
         let add = |((leaf, outline), contacts): (&(u32, Outline), &mut SmallVec<[Contact; MOST_LINES]>)| {
             let (lines, rays) = shadows.on(*leaf, outline);
+            if lines.is_empty() {
+                return rays;
+            }
             let at = |corner: &Corner| layout.vertices.positions[corner.vertex as usize];
             let corners: SmallVec<[Vec3; 12]> = outline.iter().map(at).collect();
             let near = ON * elements.nodes[*leaf as usize].radius;
