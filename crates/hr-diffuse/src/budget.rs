@@ -7,7 +7,6 @@ use crate::hooks::LightField;
 use crate::links::Link;
 use crate::shooting;
 use crate::solver::{Settings, Transport};
-use crate::threads::prelude::*;
 use crate::{Facing, Rgb};
 use std::time::Duration;
 
@@ -104,9 +103,9 @@ impl Account {
         links: u64,
         weights: u64,
     ) -> u64 {
-        let received = incident.par_iter().map(|light| field.incident_bytes(light) as u64);
-        let sent = reflected.par_iter().map(|light| field.exitant_bytes(light) as u64);
-        let extension = weights + received.sum::<u64>() + sent.sum::<u64>();
+        let received: usize = incident.iter().map(|light| field.incident_bytes(light)).sum();
+        let sent: usize = reflected.iter().map(|light| field.exitant_bytes(light)).sum();
+        let extension = weights + (received + sent) as u64;
         self.extension = extension as f64 / links.max(1) as f64;
         self.bytes::<L>(incident.len() as u64, links) + extension
     }

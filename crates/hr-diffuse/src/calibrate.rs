@@ -11,7 +11,7 @@ use crate::hooks::LightField;
 use crate::residual::reflected_along;
 use crate::sampling::{cosine_direction, hash, point4, unit};
 use crate::segments::receiving_point;
-use crate::threads::{self, prelude::*};
+use crate::threads;
 use crate::transport::Light;
 use glam::Vec2;
 use std::ops::ControlFlow;
@@ -151,7 +151,7 @@ pub(crate) fn calibrate<L: LightField>(
             return None;
         }
         let part = found.len()..expected.len().min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
-        found.par_extend(part.into_par_iter().with_min_len(8).map(look));
+        found.extend(threads::map_range(part, 8, look));
     }
     let factors = factors(light.elements, expected.iter().map(|of| of.place).zip(found), OF_LINKS);
     let factor = |&Expected { place, .. }: &Expected| {

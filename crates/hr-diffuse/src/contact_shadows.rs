@@ -10,7 +10,7 @@ use crate::hierarchy::{Element, Kind};
 use crate::hooks::LightField;
 use crate::refine::{MutableLight, Tolerance, can_split};
 use crate::sampling::{cosine_direction, hash, point4};
-use crate::threads::{self, prelude::*};
+use crate::threads;
 use crate::transport::Light;
 use crate::vertices::INSET;
 use crate::visibility::Region;
@@ -47,7 +47,7 @@ pub(crate) fn split<L: LightField>(
             if watch(light.elements.nodes.len() as u64).is_break() {
                 return rays;
             }
-            looked.par_extend(some.par_iter().map(|&leaf| is_partly_shut_in(reader, tolerance, leaf)));
+            looked.extend(threads::map(some, 1, |&leaf| is_partly_shut_in(reader, tolerance, leaf)));
         }
         let mut parts = Vec::new();
         for (leaf, (splits, shot)) in leaves.into_iter().zip(looked) {

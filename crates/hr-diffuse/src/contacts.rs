@@ -16,7 +16,7 @@ use crate::geometry::Geometry;
 use crate::hierarchy::{Element, Elements, SceneData};
 use crate::hooks::LightField;
 use crate::sealed::outward;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::transport::Light;
 use crate::vertices::{Corner, INSET, Layout, Outline, Vertices};
 use crate::visibility::Region;
@@ -88,10 +88,11 @@ impl Contacts {
     pub(crate) fn new<L: LightField>(light: Light<'_, L>, layout: &Layout) -> Self {
         let Light { scene, elements, .. } = light;
         let look = |(leaf, _): &(u32, Outline)| contacts(scene, elements, *leaf);
-        let mut found: Vec<_> = layout.parts.par_iter().with_min_len(64).map(look).collect();
+        let mut found = threads::map(&layout.parts, 64, look);
         part(elements, layout, &mut found);
         let shadows = ShadowLines::new(light);
-        let add = |((leaf, outline), contacts): (&(u32, Outline), &mut SmallVec<[Contact; MOST_LINES]>)| {
+        let add = |part: usize, contacts: &mut SmallVec<[Contact; MOST_LINES]>| {
+            let (leaf, outline) = &layout.parts[part];
             let (lines, rays) = shadows.on(*leaf, outline);
             if lines.is_empty() {
                 return rays;
@@ -106,7 +107,7 @@ impl Contacts {
             }
             rays
         };
-        let rays = layout.parts.par_iter().zip(&mut found).with_min_len(64).map(add).sum();
+        let rays = threads::map_mut(&mut found, 64, add).into_iter().sum();
         let of = layout.parts.iter().map(|(leaf, _)| *leaf).zip(found);
         Self { of: of.filter(|(_, contacts)| !contacts.is_empty()).collect(), rays }
     }

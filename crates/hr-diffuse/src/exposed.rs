@@ -11,7 +11,7 @@ use crate::geometry::{Domain, Geometry};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::sampling::{cosine_direction, hash, point2};
 use crate::sealed::{Side, is_back, outward};
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::visibility::Region;
 use glam::{Vec2, Vec3};
 
@@ -30,12 +30,8 @@ const ASIDE: f32 = 1e-5;
 
 /// Finds the shares of new nodes' areas that light may reach: 1 for all but leaves that are flat, 0 for wholly covered ones.
 pub(crate) fn expose(scene: &SceneData, elements: &mut Elements) {
-    let known = elements.exposed.len() as u32;
-    let new: Vec<f32> = (known..elements.nodes.len() as u32)
-        .into_par_iter()
-        .with_min_len(64)
-        .map(|node| exposed_share(scene, elements, node))
-        .collect();
+    let new = elements.exposed.len()..elements.nodes.len();
+    let new = threads::map_range(new, 64, |node| exposed_share(scene, elements, node as u32));
     elements.exposed.extend(new);
     for node in (0..elements.nodes.len()).rev() {
         let element = &elements.nodes[node];
@@ -53,11 +49,11 @@ pub(crate) fn expose(scene: &SceneData, elements: &mut Elements) {
 
 /// Finds them anew for the nodes of some surfaces; those above are found by [`expose`].
 pub(crate) fn expose_again(scene: &SceneData, elements: &mut Elements, of: impl Fn(u32) -> bool + Sync) {
-    let exposed = elements.exposed.par_iter().enumerate().with_min_len(64).map(|(node, &before)| {
+    elements.exposed = threads::map_range(0..elements.exposed.len(), 64, |node| {
         let element = &elements.nodes[node];
-        if element.is_patch() && of(element.source) { exposed_share(scene, elements, node as u32) } else { before }
+        let is_meant = element.is_patch() && of(element.source);
+        if is_meant { exposed_share(scene, elements, node as u32) } else { elements.exposed[node] }
     });
-    elements.exposed = exposed.collect();
 }
 
 /// Whether light that meets a side goes nowhere from there: it is sealed, or the inside of something.

@@ -12,7 +12,7 @@ use crate::places::Places;
 use crate::push::{self, Push, Spread, Weight, visible};
 use crate::reflect::Sends;
 use crate::shooting::Shot;
-use crate::threads::{self, prelude::*};
+use crate::threads;
 use crate::transport::Light;
 use glam::Vec3;
 use std::ops::ControlFlow;
@@ -104,11 +104,9 @@ impl Gather {
     ) -> Self {
         let push = Push::new(light, links, error, (room, known), watch);
         let emitted = light.emitted_power();
-        let group = |(link, spread): (&Link, &Spread)| Group::of_link(light, &emitted, link, *spread);
-        let groups: Vec<Group> = links.all().par_iter().zip(&push.spreads).map(group).collect();
+        let groups = by_link(links, &push.spreads, |link, spread| Group::of_link(light, &emitted, link, spread));
         // The rows of form factors are what would arrive of unit radiosity.
-        let shares = links.all().par_iter().zip(&push.spreads).map(|(link, spread)| share(light, link, *spread));
-        let each: Vec<f32> = shares.collect();
+        let each = by_link(links, &push.spreads, |link, spread| share(light, link, spread));
         let shares =
             push.sums(light, links, (&groups, &each)).into_iter().map(|[_, shares @ ..]| shares.map(|s| s.max(0.0)));
         let shares: Vec<[f32; GROUPS - 1]> = shares.collect();
@@ -229,7 +227,7 @@ impl Gather {
 
     /// By link, what it carries as `of` says.
     fn carried<T: Carried>(&self, links: &Links, of: impl Fn(&Link, Spread) -> T + Sync) -> Vec<T> {
-        links.all().par_iter().zip(&self.push.spreads).map(|(link, spread)| of(link, *spread)).collect()
+        by_link(links, &self.push.spreads, of)
     }
 
     /// By leaf, what arrives there of what links carry.
@@ -370,11 +368,10 @@ impl Gather {
                 self.forget_directional();
                 return ControlFlow::Break(());
             }
-            let asked = directional.par_iter_mut().zip(links).with_min_len(64);
-            asked.for_each(|(directional, link)| match sends(link.sender) {
+            threads::map_mut(directional, 64, |at, directional| match sends(links[at].sender) {
                 Sends::Same if knows => (),
                 Sends::InProportion(times) if knows => *directional *= times,
-                _ => *directional = light.directional_toward(link.sender, link.receiver),
+                _ => *directional = light.directional_toward(links[at].sender, links[at].receiver),
             });
         }
         let steady = |link: &&Link| knows && light.element(link.sender).active && sends(link.sender) != Sends::Else;
@@ -399,7 +396,7 @@ impl Gather {
             if watch().is_break() {
                 return ControlFlow::Break(());
             }
-            irradiances.par_iter_mut().enumerate().with_min_len(256).for_each(|(j, irradiance)| {
+            threads::map_mut(irradiances, 256, |j, irradiance| {
                 let at = i * chunk + j;
                 let directional = self.directional.get(at).copied().unwrap_or_default();
                 *irradiance = passed(light, &links.all()[at], (self.push.spreads[at], directional), shot);
@@ -431,7 +428,7 @@ impl Gather {
             if watch().is_break() {
                 return ControlFlow::Break(());
             }
-            incident.par_iter_mut().enumerate().with_min_len(64).for_each(|(j, incident)| {
+            threads::map_mut(incident, 64, |j, incident| {
                 let node = (i * chunk + j) as u32;
                 let element = light.element(node);
                 if !element.active {
@@ -478,6 +475,11 @@ fn passed<L: LightField>(
     let direction = light.direction_to(light.element(link.receiver).center, link.sender);
     let before = shot.map_or(Rgb::ZERO, |shot| shot.emitted(light, link.sender, -direction));
     (light.emitted_with(link, directional) - before) * visible
+}
+
+/// By link, what `of` says.
+fn by_link<T: Send>(links: &Links, spreads: &[Spread], of: impl Fn(&Link, Spread) -> T + Sync) -> Vec<T> {
+    threads::map_range(0..links.all().len(), 256, |at| of(&links.all()[at], spreads[at]))
 }
 
 /// What a link carries of unit radiosity, from senders that have any.

@@ -13,7 +13,7 @@ use crate::rooms::{self, NO_ROOM, Rooms};
 use crate::scene::{Light, LightKind};
 use crate::sealed::{Side, is_back, lit_sides};
 use crate::skips::Skips;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::tree::{Leaves, tree};
 use crate::visibility::Visibility;
 use crate::{Cone, DiffuseMaterial, Facing, Rgb, SurfaceReflectance};
@@ -268,7 +268,8 @@ impl Elements {
     /// Finds the touched sides anew, those of some surfaces.
     pub(crate) fn find_touched(&mut self, scene: &SceneData, of: impl Fn(u32) -> bool + Sync) {
         let elements = &*self;
-        let touched = |surface: u32| {
+        let touched = |surface: usize| {
+            let surface = surface as u32;
             let is_touched = |side| elements.has(side) && is_touched(scene, elements, side);
             if of(surface) {
                 [2 * surface, 2 * surface + 1].map(is_touched)
@@ -276,7 +277,7 @@ impl Elements {
                 elements.touched[surface as usize]
             }
         };
-        self.touched = (0..scene.surfaces().len() as u32).into_par_iter().with_min_len(64).map(touched).collect();
+        self.touched = threads::map_range(0..scene.surfaces().len(), 64, touched);
     }
 
     /// Share of a leaf's area that light may reach: the rest lies below something that stands on it. The leaf's irradiance

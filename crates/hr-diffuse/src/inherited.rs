@@ -11,7 +11,7 @@ use crate::gather::{GROUPS, Group};
 use crate::hooks::{Hierarchy, LightField, NodeId};
 use crate::links::Links;
 use crate::push::Spread;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::transport::Light;
 use glam::{Vec3, Vec3Swizzles};
 use std::ops::{AddAssign, Mul, Range};
@@ -132,6 +132,7 @@ struct Summed<T> {
 }
 
 /// A node where a thread begins, with what comes from above.
+#[derive(Default)]
 struct Start<T> {
     node: u32,
     summed: Summed<T>,
@@ -175,14 +176,13 @@ pub(crate) fn inherit<L: LightField, T: Carried, R: Send>(
     };
     let at_places = |_: u32, _: &Inherited<'_, T>| unreachable!("nothing else is below a place");
     descend(light, above, root, (&mut begin, &is_place), at_places);
-    let answers = starts.into_par_iter().with_min_len(1).map(|start| {
+    let answers: Vec<Vec<(u32, R)>> = threads::map_mut(&mut starts, 1, |_, start| {
         let mut answers = Vec::new();
-        descend(light, above, start, (&mut |_, _, _| false, &is_place), |place, inherited| {
+        descend(light, above, std::mem::take(start), (&mut |_, _, _| false, &is_place), |place, inherited| {
             answers.push((place, answer(place, inherited)));
         });
         answers
     });
-    let answers: Vec<Vec<(u32, R)>> = answers.collect();
     let mut answers: Vec<(u32, R)> = answers.into_iter().flatten().collect();
     answers.sort_unstable_by_key(|answer| answer.0);
     answers

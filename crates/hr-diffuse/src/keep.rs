@@ -19,7 +19,7 @@ use crate::rooms::Rooms;
 use crate::solution::Solution;
 use crate::solver::scene_by;
 use crate::stats::{Skipped, Stats};
-use crate::threads::{join, prelude::*};
+use crate::threads;
 use crate::transport::Exitant;
 use crate::vertices::{Corner, Vertices};
 use crate::visibility::Visibility;
@@ -143,8 +143,8 @@ impl<L: Keep> Solution<L> {
         light: &mut [Reader<'_>],
     ) -> Result<Self, RestoreError> {
         let start = Instant::now();
-        let restore_light = || light.par_iter_mut().map(|from| restore_run(&field, from)).collect();
-        let (own, light): (_, Result<Vec<_>, _>) = join(|| Own::restore(input, &field, own), restore_light);
+        let restore_light = || threads::map_mut(light, 1, |_, from| restore_run(&field, from)).into_iter().collect();
+        let (own, light): (_, Result<Vec<_>, _>) = threads::join(|| Own::restore(input, &field, own), restore_light);
         let Own { scene, mut stats, elements, exitant, links, vertices, faces, faint, unfinished } = own?;
         let light = light?;
         let nodes = elements.nodes.len();

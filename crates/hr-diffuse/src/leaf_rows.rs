@@ -7,7 +7,7 @@ use crate::hierarchy::Kind;
 use crate::hooks::LightField;
 use crate::sampling::{cosine_direction, hash, point2, unit};
 use crate::segments::receiving_point;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::transport::Light;
 
 /// Relative uncertainty of what arrives from emitters, through other links that leaves look at, and through those that they do
@@ -108,7 +108,7 @@ pub(crate) fn balance<L: LightField>(
         };
         side.iter().map(factors).collect::<Vec<_>>()
     };
-    let balanced: Vec<Vec<[f32; GROUPS]>> = sides.par_iter().with_min_len(4).map(of_side).collect();
+    let balanced: Vec<Vec<[f32; GROUPS]>> = threads::map(&sides, 4, of_side);
     let mut factors = vec![[0.0; GROUPS]; places.len()];
     for (&index, balanced) in order.iter().zip(balanced.into_iter().flatten()) {
         factors[index as usize] = balanced;

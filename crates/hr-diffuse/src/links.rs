@@ -1,6 +1,6 @@
 //! Links: who lights whom, through which form factor, how visibly. 16 bytes each, sorted by receiver.
 
-use crate::threads::prelude::*;
+use crate::threads;
 use std::ops::Range;
 
 /// Light passes from `sender` to `receiver`.
@@ -30,7 +30,7 @@ pub struct Links {
 impl Links {
     /// Sorts links by receiver.
     pub(crate) fn new(mut all: Vec<Link>, nodes: usize) -> Self {
-        all.par_sort_unstable_by_key(|link| (u64::from(link.receiver) << 32) | u64::from(link.sender));
+        threads::sort_unstable_by_key(&mut all, |link| (u64::from(link.receiver) << 32) | u64::from(link.sender));
         let mut first = vec![0_u32; nodes + 1];
         for link in &all {
             first[link.receiver as usize + 1] += 1;

@@ -6,7 +6,7 @@
 
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::FLAT_COSINE;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::transport::Exitant;
 use crate::{Facing, Rgb};
 use glam::Vec3;
@@ -35,7 +35,7 @@ impl Misjudged {
             let is_bent = element.kind == Kind::Cluster && element.normals.cos_angle <= FLAT_COSINE;
             if is_bent && is_bright { regions(elements, exitant, node) } else { 0 }
         };
-        Self((0..elements.nodes.len()).into_par_iter().with_min_len(64).map(judge).collect())
+        Self(threads::map_range(0..elements.nodes.len(), 64, judge))
     }
 
     /// Whether a node's light may be misjudged in a direction away from it.

@@ -13,7 +13,7 @@ use crate::hooks::LightField;
 use crate::links::Links;
 use crate::sampling::hash;
 use crate::segments::visibility;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::transport::Light;
 use crate::visibility::{NO_BLOCKER, Proof};
 use glam::Vec3;
@@ -79,7 +79,7 @@ fn divided<L: LightField>(light: Light<'_, L>, links: &Links, edges: Option<Edge
         }
         (found, shot)
     };
-    let divided: Vec<(Vec<u32>, u64)> = whole.par_iter().with_min_len(16).map(divide).collect();
+    let divided: Vec<(Vec<u32>, u64)> = threads::map(&whole, 16, divide);
     let rays = divided.iter().map(|(_, rays)| rays).sum();
     let mut places: Vec<u32> = divided.into_iter().flat_map(|(places, _)| places).collect();
     places.sort_unstable();

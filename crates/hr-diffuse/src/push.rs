@@ -17,7 +17,7 @@ use crate::links::{Link, Links};
 use crate::places::{Edges, Places};
 use crate::sampling::hash;
 use crate::segments::{receiving_point, visibility};
-use crate::threads::{self, prelude::*};
+use crate::threads;
 use crate::transport::{Light, negligible};
 use crate::visibility::Proof;
 use glam::{Vec2, Vec3};
@@ -163,7 +163,7 @@ impl Push {
             if error.is_some() && watch().is_break() {
                 return Self::new(light, links, None, (room, None), watch);
             }
-            let shot = part.par_iter_mut().with_min_len(4).map(|(node, weights)| {
+            let shot = threads::map_mut(part, 4, |_, (node, weights)| {
                 let (mut slots, mut rays) = (weights.chunks_exact_mut(numbers(light, *node)), 0);
                 let mut known = known.map(|known| known.of(light.elements, *node));
                 push.each(light, *node, |place, at| {
@@ -182,7 +182,7 @@ impl Push {
                 });
                 u64::from(rays)
             });
-            rays += shot.sum::<u64>();
+            rays += shot.into_iter().sum::<u64>();
         }
         push.rays = rays;
         push.weights = weights;
@@ -308,7 +308,7 @@ impl Push {
             });
             slope
         };
-        self.places.joined().into_par_iter().with_min_len(16).map(slope).collect()
+        threads::map(&self.places.joined(), 16, |&index| slope(index))
     }
 }
 
@@ -325,7 +325,13 @@ pub(crate) fn spreads<L: LightField>(
     links: &Links,
     error: Option<f32>,
 ) -> (Vec<Spread>, Vec<f32>) {
-    links.all().par_iter().with_min_len(256).map(|link| spread(light, link, error)).unzip()
+    let mut means = vec![0.0; links.all().len()];
+    let spreads = threads::map_mut(&mut means, 256, |at, mean| {
+        let (spread, brings) = spread(light, &links.all()[at], error);
+        *mean = brings;
+        spread
+    });
+    (spreads, means)
 }
 
 /// Those of a link.

@@ -18,7 +18,7 @@ use crate::rows::{self, Correction, Row, look_around};
 use crate::sampling::hash;
 use crate::segments::visibility_at;
 use crate::solution::Seen;
-use crate::threads::{self, prelude::*};
+use crate::threads;
 use crate::transport::{Light, negligible};
 use crate::vertices::{Vertices, outlines_of_parts, point_on};
 use crate::within::Within;
@@ -103,46 +103,42 @@ pub(crate) fn reconstruct<L: LightField>(
             break;
         }
         let end = (start + chunk).min(count);
-        let part: Vec<Gathering> = (start..end)
-            .into_par_iter()
-            .with_min_len(16)
-            .map(|vertex| {
-                let around = vertices.leaves_around(vertex as u32);
-                if around.iter().all(|&leaf| light.element(leaf).importance <= 0.0) {
-                    return Gathering::default();
-                }
-                if !gathers(vertex as u32) {
-                    return mean_around(light, &vertices, vertex as u32);
-                }
-                let (afar, seed) = (&from_afar[vertex], seed(vertices.positions[vertex]));
-                let spots = || footprint(light, (&vertices, vertex as u32), (COVER, seed));
-                let hidden = LazyCell::new(|| Hidden::from_all(light, links, around));
-                let gather = |place: (u32, Vec2), looks| {
-                    let negligible = negligible(light.exitant.irradiance[place.0 as usize], error);
-                    let inherited = (afar, near.of(place.0));
-                    let from = (seed, &spots, looks);
-                    let place = (place, negligible);
-                    gather_at(light, (links, &spreads, &shares), place, inherited, from, |sender| hidden.holds(sender))
-                };
-                let place = (vertices.leaf[vertex], places[vertex]);
-                let mut gathering = gather(place, Looks::FromVertex);
-                // What covers one of the leaves around need not cover another.
-                let mut others = contacts.places_around(&vertices, vertex as u32).into_iter();
-                let again = |gathering: Gathering, place, looks| {
-                    let other = gather(place, looks);
-                    Gathering { rays: gathering.rays + other.rays, ..other }
-                };
-                while gathering.covered
-                    && let Some(place) = others.next()
-                {
-                    gathering = again(gathering, place, Looks::FromVertex);
-                }
-                if gathering.covered {
-                    gathering = again(gathering, place, Looks::FromFootprint);
-                }
-                gathering
-            })
-            .collect();
+        let part: Vec<Gathering> = threads::map_range(start..end, 16, |vertex| {
+            let around = vertices.leaves_around(vertex as u32);
+            if around.iter().all(|&leaf| light.element(leaf).importance <= 0.0) {
+                return Gathering::default();
+            }
+            if !gathers(vertex as u32) {
+                return mean_around(light, &vertices, vertex as u32);
+            }
+            let (afar, seed) = (&from_afar[vertex], seed(vertices.positions[vertex]));
+            let spots = || footprint(light, (&vertices, vertex as u32), (COVER, seed));
+            let hidden = LazyCell::new(|| Hidden::from_all(light, links, around));
+            let gather = |place: (u32, Vec2), looks| {
+                let negligible = negligible(light.exitant.irradiance[place.0 as usize], error);
+                let inherited = (afar, near.of(place.0));
+                let from = (seed, &spots, looks);
+                let place = (place, negligible);
+                gather_at(light, (links, &spreads, &shares), place, inherited, from, |sender| hidden.holds(sender))
+            };
+            let place = (vertices.leaf[vertex], places[vertex]);
+            let mut gathering = gather(place, Looks::FromVertex);
+            // What covers one of the leaves around need not cover another.
+            let mut others = contacts.places_around(&vertices, vertex as u32).into_iter();
+            let again = |gathering: Gathering, place, looks| {
+                let other = gather(place, looks);
+                Gathering { rays: gathering.rays + other.rays, ..other }
+            };
+            while gathering.covered
+                && let Some(place) = others.next()
+            {
+                gathering = again(gathering, place, Looks::FromVertex);
+            }
+            if gathering.covered {
+                gathering = again(gathering, place, Looks::FromFootprint);
+            }
+            gathering
+        });
         for (vertex, gathering) in (start..end).zip(part) {
             sights.extend(gathering.sight.map(|sight| (vertex, sight)));
             rays += u64::from(gathering.rays);
@@ -165,7 +161,7 @@ fn lean<L: LightField>(light: Light<'_, L>, vertices: &mut Vertices, sights: &[(
         return;
     }
     let leaning = Leaning::new(light, vertices);
-    let more: Vec<Rgb> = sights.par_iter().with_min_len(16).map(|(_, sight)| leaning.beside(light, sight)).collect();
+    let more = threads::map(sights, 16, |(_, sight)| leaning.beside(light, sight));
     for ((vertex, _), more) in sights.iter().zip(more) {
         let most = vertices.indirect[*vertex] * MOST_LEAN;
         let more = more.clamp(-most, most);
@@ -428,11 +424,12 @@ fn inherited<L: LightField>(
         let indirect = irradiance * shares[link.sender as usize];
         Brought { irradiance, share: share(light, link, spread), indirect }
     };
-    let carried: Vec<Brought> = links.all().par_iter().zip(spreads).map(brought).collect();
-    let groups: Vec<Group> = links.all().par_iter().map(|link| Group::of(light, link.sender)).collect();
+    let mut carried = vec![Brought::default(); links.all().len()];
+    threads::map_mut(&mut carried, 256, |at, carried| *carried = brought((&links.all()[at], &spreads[at])));
+    let groups = threads::map(links.all(), 256, |link| Group::of(light, link.sender));
     let mut of_leaf: Vec<(u32, u32)> =
         vertices.leaf.iter().copied().zip(0..).filter(|&(_, vertex)| gathers(vertex)).collect();
-    of_leaf.par_sort_unstable();
+    threads::sort_unstable(&mut of_leaf);
     let above = Above { links, spreads, groups: &groups, carried: &carried };
     let found = inherit(
         light,

@@ -23,7 +23,7 @@ use crate::segments;
 use crate::shadows;
 use crate::skips::Skips;
 use crate::stats::Skipped;
-use crate::threads::{self, prelude::*};
+use crate::threads;
 use crate::transport::{Exitant, Light};
 use crate::visibility::Proof;
 use glam::{DVec3, Vec3};
@@ -194,13 +194,13 @@ pub(crate) fn refine<L: LightField>(
             refined.stopped = refined.stopped || watch(wave.len() as u64, refined.links.len() as u64).is_break();
             refined.spent = refined.spent.or(account.is_late().then_some(Spent::Time));
             let stopped = refined.stopped || refined.spent.is_some();
-            let decided = part.par_iter().with_min_len(32).map(|candidate| {
+            let decided = threads::map(part, 32, |candidate| {
                 let inherited = if stopped { inherited(reader, candidate) } else { None };
                 let decided = || decide(reader, candidate, (tolerance, &lobes), stopped, &counters);
                 let keep = |link| if candidate.own().is_some() { Verdict::Keep(link) } else { Verdict::Inherit(link) };
                 inherited.map_or_else(decided, keep)
             });
-            verdicts.par_extend(decided);
+            verdicts.extend(decided);
             // Pair by pair: where memory ends does not depend on the number of threads.
             let full = (first..verdicts.len()).find(|&i| {
                 growth.add(reader.elements, &verdicts[i].split(wave[i].pair));

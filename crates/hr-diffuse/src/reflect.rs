@@ -15,7 +15,7 @@ use crate::sent::Sent;
 use crate::shooting::NEW_SHARE;
 use crate::solution::Seen;
 use crate::solver::{Phase, Progress, Solver, Transport};
-use crate::threads::{self, prelude::*};
+use crate::threads;
 use crate::vertices::outlines;
 use crate::{Cone, Rgb};
 use smallvec::SmallVec;
@@ -376,13 +376,10 @@ impl<L: LightField> Solver<L> {
     /// Finds the node whose leaves stand for each node, and how bright it is at most.
     fn refer(&mut self, changed: &[u32]) {
         let (field, reflected) = (&self.field, &self.reflected);
-        let brightest: Vec<f32> = changed
-            .par_iter()
-            .map(|&leaf| {
-                let (low, high) = field.radiance_bounds(&reflected[leaf as usize], &Cone::SPHERE);
-                high.max(-low).max_element().max(0.0)
-            })
-            .collect();
+        let brightest = threads::map(changed, 1, |&leaf| {
+            let (low, high) = field.radiance_bounds(&reflected[leaf as usize], &Cone::SPHERE);
+            high.max(-low).max_element().max(0.0)
+        });
         for (&leaf, brightest) in changed.iter().zip(brightest) {
             self.brightest[leaf as usize] = brightest;
         }
@@ -470,7 +467,7 @@ impl<L: LightField> Solver<L> {
             if watch().is_break() {
                 break;
             }
-            exitant.par_extend(part.par_iter().map(reflect));
+            exitant.extend(threads::map(part, 1, reflect));
         }
         (exitant, closely.rays())
     }

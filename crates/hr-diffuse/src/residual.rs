@@ -12,7 +12,7 @@ use crate::hooks::LightField;
 use crate::rooms::{NO_ROOM, ROOMS};
 use crate::sampling::{cosine_direction, hash, point4, unit};
 use crate::segments::{light_segment, pick};
-use crate::threads::{self, prelude::*};
+use crate::threads;
 use crate::transport::Light;
 use crate::visibility::NO_BLOCKER;
 use glam::{Vec2, Vec3};
@@ -121,7 +121,7 @@ pub(crate) fn residual<L: LightField>(
             return None;
         }
         let part = found.len()..count.min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
-        found.par_extend(part.into_par_iter().with_min_len(1).map(look));
+        found.extend(threads::map_range(part, 1, look));
     }
     let (mut absolute, mut squares, mut noise, mut signed, mut total, mut direct, mut rays) =
         (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0);

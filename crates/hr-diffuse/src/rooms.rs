@@ -16,7 +16,7 @@ use crate::geometry::Domain;
 use crate::hierarchy::Element;
 use crate::sampling::{cosine_direction, hash, point4};
 use crate::sealed::{MOST_LEAVING, ROUNDS, Side, Spots, is_back};
-use crate::threads::prelude::*;
+use crate::threads;
 
 /// Lit groups are joined by so many rays of each spot at most.
 const MOST_RAYS: usize = 16;
@@ -93,7 +93,7 @@ pub(crate) fn rooms(spots: &mut Spots<'_>, first: u32) -> (Rooms, Vec<[u32; 2]>)
             spots.place(spot as u32).map_or_else(|| geometry.bounds(Domain::WHOLE), |at| Aabb::of_points([at]));
         part.bounds = part.bounds.union(&of_spot);
     }
-    let closed: Vec<bool> = parts.par_iter().map(|part| is_closed(spots, &part.spots)).collect();
+    let closed = threads::map(&parts, 1, |part| is_closed(spots, &part.spots));
     // Where there is one room the rest, what lies under the sky or is taken for lit by mistake, does not make another.
     if closed.iter().filter(|closed| **closed).count() < 2 {
         return (Rooms::ONE, of_sides);

@@ -13,7 +13,7 @@ use crate::hierarchy::SceneData;
 use crate::rooms::{Rooms, rooms};
 use crate::sampling::{cosine_direction, hash, point2, point4};
 use crate::segments::light_segment;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::visibility::{NO_BLOCKER, Region};
 use crate::{Light, Rgb};
 use glam::{Vec2, Vec3};
@@ -173,15 +173,17 @@ impl<'a> Spots<'a> {
             scene,
             all: Vec::with_capacity(count),
             of_side: vec![NONE; 2 * count],
-            large: scene.surfaces().par_iter().map(is_large).collect(),
+            large: scene.surfaces().iter().map(is_large).collect(),
             groups: Groups::default(),
         };
         let emits = |side: Side| {
             let material = scene.surface_materials[(side / 2) as usize];
             !is_back(side) && scene.materials[material as usize].exitance != Rgb::ZERO
         };
-        let takes_part = |&side: &Side| reflects(scene, idle, side) && (emits(side) || !faces_nothing(scene, side));
-        let sides: Vec<Side> = (0..2 * count as u32).into_par_iter().filter(takes_part).collect();
+        let takes_part = |side: Side| reflects(scene, idle, side) && (emits(side) || !faces_nothing(scene, side));
+        let take_part = threads::map_range(0..2 * count, 64, |side| takes_part(side as Side));
+        let sides =
+            take_part.into_iter().zip(0..).filter_map(|(takes_part, side): (bool, Side)| takes_part.then_some(side));
         for side in sides {
             if !spots.large[(side / 2) as usize] {
                 spots.add(side, Vec3::ZERO, emits(side));
@@ -227,7 +229,7 @@ impl<'a> Spots<'a> {
             let share = rays / sharing[self.groups.known_root(spot)];
             self.look(spot, first..first + share.max(1))
         };
-        let seen: Vec<Seen> = looking.par_iter().with_min_len(16).map(look).collect();
+        let seen = threads::map(&looking, 16, look);
         for (&spot, seen) in looking.iter().zip(&seen) {
             for met in &seen.met {
                 match *met {
@@ -286,7 +288,7 @@ impl<'a> Spots<'a> {
                 dark[self.groups.known_root(spot)].push(spot);
             }
         }
-        dark.par_iter().map(|spots| !spots.is_empty() && self.has_window(spots)).collect()
+        threads::map(&dark, 1, |spots| !spots.is_empty() && self.has_window(spots))
     }
 
     /// Whether some ray from spots of large sides leaves the scene, but most do not.

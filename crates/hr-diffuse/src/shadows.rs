@@ -10,7 +10,7 @@ use crate::links::Links;
 use crate::lobes::Lobes;
 use crate::refine::{MutableLight, Tolerance, can_split, estimate};
 use crate::segments::visibility_at;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::transport::Light;
 use crate::vertices::{Corner, INSET, Outline, outlines, point_on};
 use glam::Vec2;
@@ -76,7 +76,7 @@ pub(crate) fn sew<L: LightField>(
             let (torn, rays) = is_torn(reader, (links, &lobes), tolerance, *leaf, outline);
             (torn.then_some(*leaf), u64::from(rays))
         };
-        let looked: Vec<(Option<u32>, u64)> = leaves.par_iter().with_min_len(64).map(look).collect();
+        let looked = threads::map(&leaves, 64, look);
         rays += looked.iter().map(|(_, rays)| rays).sum::<u64>();
         let torn: Vec<u32> = looked.into_iter().filter_map(|(leaf, _)| leaf).collect();
         if torn.is_empty() || watch(light.elements.nodes.len() as u64).is_break() {

@@ -27,7 +27,7 @@ use crate::shooting::Shot;
 use crate::skips::Skips;
 use crate::stats::Stats;
 use crate::steady;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::transport::{Exitant, Light};
 use crate::twins::twins;
 use crate::visibility::Visibility;
@@ -1016,11 +1016,12 @@ pub(crate) fn scene_by<E: From<SolveError>>(
     rays: impl FnOnce(Vec<Geometry>, &[u32]) -> Result<(Visibility, Vec<u32>), E>,
 ) -> Result<SceneData, E> {
     check(input)?;
-    let all = input.surfaces.par_iter().with_min_len(256).enumerate().map(|(surface, s)| {
-        Geometry::from_surface(s, &normalization).map_err(|source| SolveError::Surface { surface, source })
+    let all = threads::map_range(0..input.surfaces.len(), 256, |surface| {
+        let geometry = Geometry::from_surface(&input.surfaces[surface], &normalization);
+        geometry.map_err(|source| SolveError::Surface { surface, source })
     });
     // The first error of all, whichever thread finds one first.
-    let surfaces = all.collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()?;
+    let surfaces = all.into_iter().collect::<Result<Vec<_>, _>>()?;
     let lights = unit_lights(input, &normalization)?;
     let surface_materials: Vec<u32> = input.surfaces.iter().map(|s| s.material).collect();
     let (visibility, twins) = rays(surfaces, &surface_materials)?;

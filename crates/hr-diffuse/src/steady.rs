@@ -12,7 +12,7 @@ use crate::geometry::Domain;
 use crate::hierarchy::SceneData;
 use crate::sampling::{cosine_direction, hash, point4};
 use crate::sealed::{Groups, Side, sees_light};
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::{LightKind, Rgb};
 
 /// Reflectances above this are taken for 1: rounding of what an extension adds.
@@ -32,11 +32,12 @@ pub(crate) fn check(scene: &SceneData, extra: impl Fn(u32) -> Rgb) -> Result<(),
         return Ok(());
     }
     let count = scene.surfaces().len() as u32;
-    let albedo = |surface: u32| {
+    let albedo = |surface: usize| {
+        let surface = surface as u32;
         let other = extra[scene.surface_materials[surface as usize] as usize];
         if scene.is_twin(surface) { Rgb::ZERO } else { scene.reflectance(surface, &Domain::WHOLE) + other }
     };
-    let albedos: Vec<Rgb> = (0..count).into_par_iter().map(albedo).collect();
+    let albedos = threads::map_range(0..count as usize, 64, albedo);
     for (channel, name) in CHANNELS.into_iter().enumerate() {
         let entire: Vec<bool> = (0..2 * count)
             .map(|side| {
@@ -55,7 +56,7 @@ pub(crate) fn check(scene: &SceneData, extra: impl Fn(u32) -> Rgb) -> Result<(),
 /// A side of a lit group from which no ray leaves.
 fn endless(scene: &SceneData, entire: &[bool], sides: &[Side], channel: usize) -> Option<Side> {
     let rays = (RAYS / (sides.len() as u32).max(1)).max(LEAST_RAYS);
-    let seen: Vec<Seen> = sides.par_iter().map(|&side| look(scene, entire, side, rays, channel)).collect();
+    let seen = threads::map(sides, 1, |&side| look(scene, entire, side, rays, channel));
     let mut groups = Groups::new(entire.len());
     for (&side, seen) in sides.iter().zip(&seen) {
         for &other in &seen.sides {

@@ -6,7 +6,7 @@
 
 use crate::geometry::{Aabb, Domain, Geometry, Outline};
 use crate::sealed::Side;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::tree::{Leaves, tree};
 use glam::{BVec4A, Vec2, Vec3, Vec3A, Vec4};
 use obvhs::Boundable;
@@ -537,9 +537,10 @@ impl Groups {
             let bounds = geometries[surface as usize].bounds(Domain::WHOLE);
             ([bounds.min, bounds.max].map(|p| p.to_array().map(f32::to_bits)), surface)
         };
-        let own = (0..geometries.len() as u32).into_par_iter().filter(|&surface| first[surface as usize] == surface);
-        let mut sorted: Vec<([[u32; 3]; 2], u32)> = own.map(bounds).collect();
-        sorted.par_sort_unstable();
+        let own: Vec<u32> =
+            (0..geometries.len() as u32).filter(|&surface| first[surface as usize] == surface).collect();
+        let mut sorted: Vec<([[u32; 3]; 2], u32)> = threads::map(&own, 1024, |&surface| bounds(surface));
+        threads::sort_unstable(&mut sorted);
         let mut result = Self { boxes: Vec::new(), surfaces: Vec::with_capacity(sorted.len()), starts: vec![0] };
         for group in sorted.chunk_by(|a, b| a.0 == b.0) {
             let [min, max] = group[0].0.map(|bits| Vec3::from_array(bits.map(f32::from_bits)));

@@ -8,7 +8,7 @@
 use crate::Rgb;
 use crate::hooks::LightField;
 use crate::places::Places;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::transport::Light;
 use crate::vertices::Vertices;
 
@@ -46,8 +46,8 @@ impl Within {
         // Leaves on which others stand are cut: what they show ends at a line.
         let mut is_joined = vec![false; light.elements.nodes.len()];
         leaves.iter().for_each(|&leaf| is_joined[leaf as usize] = vertices.fans(leaf).count() == 1);
-        let holds = |vertex: u32| {
-            let around = vertices.leaves_around(vertex);
+        let holds = |vertex: usize| {
+            let around = vertices.leaves_around(vertex as u32);
             let irradiance = |&leaf: &u32| light.exitant.irradiance[leaf as usize].element_sum();
             let (low, high) =
                 around.iter().map(irradiance).fold((f32::MAX, 0.0_f32), |(low, high), e| (low.min(e), high.max(e)));
@@ -55,7 +55,7 @@ impl Within {
             !around.is_empty() && around.iter().all(|&leaf| is_joined[leaf as usize]) && high - low <= EDGE * high
         };
         let rounds = (leaves.len() / count / LEAVES_PER_ROUND).clamp(1, MOST_ROUNDS);
-        let holds = (0..vertices.positions.len() as u32).into_par_iter().with_min_len(1024).map(holds).collect();
+        let holds = threads::map_range(0..vertices.positions.len(), 1024, holds);
         Self { leaves, rounds, holds }
     }
 
@@ -93,7 +93,7 @@ impl Within {
                 });
                 (leaf, sum / f32::max(count, 1.0))
             };
-            let means: Vec<(u32, Rgb)> = self.leaves.par_iter().with_min_len(1024).map(mean).collect();
+            let means: Vec<(u32, Rgb)> = threads::map(&self.leaves, 1024, mean);
             means.into_iter().for_each(|(leaf, mean)| of_leaf[leaf as usize] = mean);
             self.even_out(&of_leaf, vertices, values);
         }
@@ -101,12 +101,12 @@ impl Within {
 
     /// Sets the vertices within to the mean of the leaves around.
     fn even_out(&self, of_leaf: &[Rgb], vertices: &Vertices, values: &mut [Rgb]) {
-        values.par_iter_mut().enumerate().with_min_len(1024).filter(|(vertex, _)| self.holds[*vertex]).for_each(
-            |(vertex, value)| {
+        threads::map_mut(values, 1024, |vertex, value| {
+            if self.holds[vertex] {
                 let around = vertices.leaves_around(vertex as u32);
                 *value = around.iter().map(|&leaf| of_leaf[leaf as usize]).sum::<Rgb>() / around.len() as f32;
-            },
-        );
+            }
+        });
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{LEAF, Leaf, Node, Primitive, Visibility};
 use crate::flat::{FlatError, Reader, Writer, fits};
 use crate::geometry::Geometry;
-use crate::threads::prelude::*;
+use crate::threads;
 use std::io;
 
 const TREE: &str = "tree of surfaces";
@@ -35,7 +35,7 @@ impl Visibility {
             primitive_of[surface] = primitive_of[twin as usize];
         }
         let primitive = |surface: &u32| Primitive::of(&geometries[*surface as usize]);
-        let primitives: Vec<Primitive> = surfaces.par_iter().with_min_len(1024).map(primitive).collect();
+        let primitives: Vec<Primitive> = threads::map(&surfaces, 1024, primitive);
         Ok(Self { geometries, nodes, leaves, primitives, surfaces, primitive_of })
     }
 }

@@ -58,7 +58,7 @@ impl Document {
                 ));
             }
         }
-        this.root = serde_json::from_slice(text).map_err(|e| this.no_json(&e))?;
+        this.root = Root::from_slice(text).map_err(|e| this.no_json(&e))?;
         this.root.extensions_required.clear();
         this.validate()?;
         for index in 0..this.root.buffers.len() {
