@@ -73,17 +73,18 @@ fn pictures(scene: &Scene, a: &Solution<GlossyField>, b: &Solution<GlossyField>,
     apart / b.iter().map(|b| b.element_sum()).sum::<f32>()
 }
 
-/// The scene before anything has moved, and its solution.
-static BEFORE: LazyLock<(Arc<Scene>, Solution<GlossyField>)> = LazyLock::new(|| {
+/// The scene before anything has moved, what has solved it, and its solution.
+static BEFORE: LazyLock<(Arc<Scene>, Solver<GlossyField>, Solution<GlossyField>)> = LazyLock::new(|| {
     let scene = Arc::new(Scene::load("glossy-sphere").expect("built in"));
-    let solution = finished(solver(&scene));
-    (scene, solution)
+    let solver = solver(&scene);
+    let solution = finished(solver.clone());
+    (scene, solver, solution)
 });
 
 /// Moves what is in the solved scene once or several times, and compares it to a fresh solve.
 fn rearranged(moves: &[Arc<Scene>]) {
-    let (first, before) = &*BEFORE;
-    let mut solver = solver(first);
+    let (_, solved, before) = &*BEFORE;
+    let mut solver = solved.clone();
     for scene in moves {
         solver.rearrange(&scene.input(), &mut |_| ControlFlow::Continue(())).expect("places of the same surfaces");
     }

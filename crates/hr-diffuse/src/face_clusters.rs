@@ -7,13 +7,24 @@
 //! moves over the cluster, and turns with the normal, is found out where the light is asked for.
 
 use crate::hierarchy::{Element, Elements};
+use crate::hooks::LightField;
 use crate::links::Links;
 use crate::vertices::Vertices;
 use glam::Vec3;
 use smallvec::SmallVec;
 
-/// Normals of a face cluster differ by at most this (radians) from their axis.
+/// Normals of a face cluster differ from their axis by at most so many widths of its material's lobe: what one leaf's light misses, as
+/// it does not see quite what others mirror, is as blurred as the lobe is wide. …
+const TURN: f32 = 2.0;
+/// … By so much (radians) they may differ however narrow it is, …
 pub(crate) const NORMALS: f32 = 0.1;
+/// … and by no more than this: other horizons see other things.
+const MOST_TURN: f32 = 0.3;
+
+/// How far (radians) normals of a face cluster may differ from their axis, by the width of the lobe.
+fn most_turn(width: f32) -> f32 {
+    (TURN * width).clamp(NORMALS, MOST_TURN)
+}
 
 /// Vertices take the light of face clusters whose middles are nearer than so many times their radius.
 const REACH: f32 = 3.0;
@@ -29,17 +40,18 @@ pub struct FaceClusters {
 }
 
 impl FaceClusters {
-    /// The largest clusters that links and normals allow.
-    pub(crate) fn new(elements: &Elements, links: &Links) -> Self {
+    /// The largest clusters that links, and normals for how wide lobes are, allow.
+    pub(crate) fn new<L: LightField>(elements: &Elements, links: &Links, field: &L) -> Self {
         let nodes = &elements.nodes;
         let mut clusters = Self::default();
         if !nodes[0].active {
             return clusters;
         }
+        let most = |material: u32| field.lobe_width(material).map_or(NORMALS, most_turn);
         // By node: the material of all that is below it, where it can be a face cluster; else none.
         let mut materials: Vec<Option<u32>> = vec![None; nodes.len()];
         for node in (0..nodes.len()).rev() {
-            materials[node] = common_material(elements, links, &materials, node as u32);
+            materials[node] = common_material(elements, links, &materials, &most, node as u32);
         }
         clusters.by_node = (0..nodes.len() as u32).map(|node| (node, node)).collect();
         let mut taken = vec![false; nodes.len()];
@@ -141,17 +153,23 @@ impl FaceClusters {
 }
 
 /// The material of all leaves below a node, if they may be a face cluster.
-fn common_material(elements: &Elements, links: &Links, materials: &[Option<u32>], node: u32) -> Option<u32> {
+fn common_material(
+    elements: &Elements,
+    links: &Links,
+    materials: &[Option<u32>],
+    most_turn: &dyn Fn(u32) -> f32,
+    node: u32,
+) -> Option<u32> {
     let element = &elements.nodes[node as usize];
     if element.child_count == 0 {
         let is_plain = element.active && element.is_patch() && element.is_flat() && elements.exposed(node) >= 1.0;
         return is_plain.then_some(element.material);
     }
-    if element.normals.angle() > NORMALS {
-        return None;
-    }
     let mut children = element.first_child..element.first_child + element.child_count;
     let first = materials[element.first_child as usize]?;
+    if element.normals.angle() > most_turn(first) {
+        return None;
+    }
     let is_like = |child: u32| materials[child as usize] == Some(first) && links.range(child).is_empty();
     children.all(is_like).then_some(first)
 }

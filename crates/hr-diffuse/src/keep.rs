@@ -204,7 +204,7 @@ impl Own {
         fits(faint.len() == scene.materials.len(), "faint materials")?;
         let unfinished = Unfinished::restore(count, from)?;
         field.restore_own(from)?;
-        let faces = FaceClusters::new(&elements, &links).with_vertices(&elements, &vertices);
+        let faces = FaceClusters::new(&elements, &links, field).with_vertices(&elements, &vertices);
         Ok(Self { scene, stats, elements, exitant, links, vertices, faces, faint, unfinished })
     }
 }

@@ -248,7 +248,11 @@ fn compared(now: &[Representative], before: &[Representative]) -> Sends {
 impl<L: LightField> Solver<L> {
     /// Leaves that stand for others, by the links that there are.
     pub(crate) fn face_clusters(&self) -> FaceClusters {
-        if self.skips.face_clusters { FaceClusters::new(&self.elements, &self.links) } else { FaceClusters::default() }
+        if self.skips.face_clusters {
+            FaceClusters::new(&self.elements, &self.links, &self.field)
+        } else {
+            FaceClusters::default()
+        }
     }
 
     /// Reflects light that arrived at senders, until `watch` breaks: all of it where it has changed, or what is new.
