@@ -15,15 +15,15 @@ use smallvec::SmallVec;
 
 /// Normals of a face cluster differ from their axis by at most so many widths of its material's lobe: what one leaf's light misses, as
 /// it does not see quite what others mirror, is as blurred as the lobe is wide. …
-const TURN: f32 = 2.0;
+const TURN: f32 = 1.5;
 /// … By so much (radians) they may differ however narrow it is, …
-pub(crate) const NORMALS: f32 = 0.1;
+const NORMALS: f32 = 0.1;
 /// … and by no more than this: other horizons see other things.
 const MOST_TURN: f32 = 0.3;
 
-/// How far (radians) normals of a face cluster may differ from their axis, by the width of the lobe.
-fn most_turn(width: f32) -> f32 {
-    (TURN * width).clamp(NORMALS, MOST_TURN)
+/// How far (radians) normals of a face cluster of a material may differ from their axis.
+pub(crate) fn most_turn<L: LightField>(field: &L, material: u32) -> f32 {
+    field.lobe_width(material).map_or(NORMALS, |width| (TURN * width).clamp(NORMALS, MOST_TURN))
 }
 
 /// Vertices take the light of face clusters whose middles are nearer than so many times their radius.
@@ -47,11 +47,11 @@ impl FaceClusters {
         if !nodes[0].active {
             return clusters;
         }
-        let most = |material: u32| field.lobe_width(material).map_or(NORMALS, most_turn);
+        let most_turn = |material: u32| most_turn(field, material);
         // By node: the material of all that is below it, where it can be a face cluster; else none.
         let mut materials: Vec<Option<u32>> = vec![None; nodes.len()];
         for node in (0..nodes.len()).rev() {
-            materials[node] = common_material(elements, links, &materials, &most, node as u32);
+            materials[node] = common_material(elements, links, &materials, &most_turn, node as u32);
         }
         clusters.by_node = (0..nodes.len() as u32).map(|node| (node, node)).collect();
         let mut taken = vec![false; nodes.len()];

@@ -7,7 +7,7 @@
 //! get what arrives there. Where the edge of a shadow passes through it is divided, as a leaf would be. Round meshes are cut so
 //! everywhere: their places bend no more than [face clusters](crate::face_clusters), which reflect as one what arrives there.
 
-use crate::face_clusters::NORMALS;
+use crate::face_clusters::most_turn;
 use crate::hierarchy::{Elements, Kind, grafted};
 use crate::hooks::LightField;
 use crate::links::Links;
@@ -21,6 +21,8 @@ use glam::Vec3;
 /// Leaves whose heights over a plane differ by less than this share of their cluster's radius lie in one plane; those of a cap whose
 /// normals differ rise by half that angle more.
 const IN_PLANE: f32 = 0.02;
+/// Normals of a place differ by at most this (radians) from their axis, …
+const MOST_BEND: f32 = 0.2;
 /// Fewer leaves than that look for themselves: they know more of it, for little more. With those whose light an extension reflects, which
 /// would reflect it as one all the same.
 const LEAST_LEAVES: u32 = 8;
@@ -37,6 +39,8 @@ struct Sheet {
     count: u32,
     /// Whether an extension reflects the light of any.
     active: bool,
+    /// How far normals may differ from their axis at most, radians.
+    most_bend: f32,
 }
 
 impl Sheet {
@@ -96,7 +100,7 @@ fn undivided<L: LightField>(light: Light<'_, L>, links: &Links) -> (Vec<u32>, Ve
     }
     let mut sheets: Vec<Option<Sheet>> = vec![None; nodes.len()];
     for node in (0..nodes.len()).rev() {
-        sheets[node] = sheet(light.elements, &sheets, &linked, node as u32);
+        sheets[node] = sheet(light, &sheets, &linked, node as u32);
     }
     // Whether a node is a place, or below one.
     let mut taken = vec![false; nodes.len()];
@@ -114,28 +118,33 @@ fn undivided<L: LightField>(light: Light<'_, L>, links: &Links) -> (Vec<u32>, Ve
 }
 
 /// The sheet that a node is, if it is one below which there are no links.
-fn sheet(elements: &Elements, sheets: &[Option<Sheet>], linked: &[bool], node: u32) -> Option<Sheet> {
-    let element = &elements.nodes[node as usize];
+fn sheet<L: LightField>(light: Light<'_, L>, sheets: &[Option<Sheet>], linked: &[bool], node: u32) -> Option<Sheet> {
+    let (elements, element) = (light.elements, light.element(node));
     // Leaves that are partly covered look for themselves.
     if element.kind == Kind::Light || elements.exposed(node) < 1.0 {
         return None;
     }
     let active = element.active;
     if element.is_patch() {
-        return (element.is_flat() && element.child_count == 0).then_some(Sheet { off: 0.0, count: 1, active });
+        // … and where an extension reflects, as one, what arrives there, by no more than that allows.
+        let most_bend = if active { most_turn(light.field, element.material).min(MOST_BEND) } else { MOST_BEND };
+        let is_plain = element.is_flat() && element.child_count == 0;
+        return is_plain.then_some(Sheet { off: 0.0, count: 1, active, most_bend });
     }
     let bend = element.normals.angle();
-    if bend > NORMALS {
+    let (mut off, mut count, mut most_bend) = (0.0_f32, 0, MOST_BEND);
+    if bend > most_bend {
         return None;
     }
-    let (mut off, mut count) = (0.0_f32, 0);
     for child in element.first_child..element.first_child + element.child_count {
         let sheet = sheets[child as usize].filter(|_| !linked[child as usize])?;
         let from_middle = elements.nodes[child as usize].center - element.center;
         count += sheet.count;
+        most_bend = most_bend.min(sheet.most_bend);
         off = off.max(sheet.off + from_middle.dot(element.normals.axis).abs());
     }
-    (off < (IN_PLANE + 0.5 * bend) * element.radius).then_some(Sheet { off, count, active })
+    let is_sheet = bend <= most_bend && off < (IN_PLANE + 0.5 * bend) * element.radius;
+    is_sheet.then_some(Sheet { off, count, active, most_bend })
 }
 
 /// Whether the edge of a shadow passes through a place, and the number of rays shot to know: whether it sees a sender in part that
