@@ -19,7 +19,7 @@ const TURN: f32 = 1.5;
 /// … By so much (radians) they may differ however narrow it is, …
 const NORMALS: f32 = 0.1;
 /// … and by no more than this: other horizons see other things.
-const MOST_TURN: f32 = 0.3;
+const MOST_TURN: f32 = 0.2;
 
 /// How far (radians) normals of a face cluster of a material may differ from their axis.
 pub(crate) fn most_turn<L: LightField>(field: &L, material: u32) -> f32 {

@@ -127,7 +127,7 @@ fn sheet<L: LightField>(light: Light<'_, L>, sheets: &[Option<Sheet>], linked: &
     let active = element.active;
     if element.is_patch() {
         // … and where an extension reflects, as one, what arrives there, by no more than that allows.
-        let most_bend = if active { most_turn(light.field, element.material).min(MOST_BEND) } else { MOST_BEND };
+        let most_bend = if active { most_turn(light.field, element.material) } else { MOST_BEND };
         let is_plain = element.is_flat() && element.child_count == 0;
         return is_plain.then_some(Sheet { off: 0.0, count: 1, active, most_bend });
     }

@@ -101,10 +101,10 @@ fn rays_of_a_pixel_see_what_its_middle_shows() {
     assert!(off < 0.005, "{off} of the light");
 }
 
-/// A polished ball of few facets, which are shown round, on a floor between walls.
-fn ball(facets: u32) -> Arc<Scene> {
-    let mut scene =
-        Scene::clone(&floor(1, MetallicRoughness::new(Rgb::new(0.9, 0.8, 0.6), 1.0, 0.2).expect("a metal")));
+/// A metal ball of so many facets around, which are shown round, on a floor between walls.
+fn ball(facets: u32, roughness: f32) -> Arc<Scene> {
+    let metal = MetallicRoughness::new(Rgb::new(0.9, 0.8, 0.6), 1.0, roughness).expect("a metal");
+    let mut scene = Scene::clone(&floor(1, metal));
     let (z, center, radius) = (DVec3::Z, DVec3::new(1.0, 1.2, 0.35), 0.3);
     // The floor is a wall's; the other wall is behind the eye.
     scene.surfaces[0].material = WALL;
@@ -134,13 +134,31 @@ fn ball(facets: u32) -> Arc<Scene> {
 /// pictures follow.
 #[test]
 fn facets_that_are_shown_round_mirror_sharply() {
-    let solved = solved(&ball(12));
+    let solved = solved(&ball(12, 0.2));
+    // 40 % are off where normals of whole facets blur them.
+    let off = distributions_are_off(&solved);
+    assert!(off < 0.1, "{off} of the light");
+}
+
+/// How much distributions of the ball are off what rays find that pictures follow.
+fn distributions_are_off(solved: &Solved) -> f32 {
     let camera = Camera { eye: [1.0, 0.3, 0.5], target: [1.0, 1.2, 0.35], fov_x: 40.0, ..camera(96) };
     let [distributions, rays] = [Mode::Distributions, Mode::Samples].map(|mode| {
         let caster = RayCaster::new(&solved.scene, &solved.solution, mode).with_grid(2);
         means(&caster.render(&camera, &|_| ()), 4)
     });
-    let off = difference(&rays, &distributions);
-    // 40 % are off where normals of whole facets blur them.
-    assert!(off < 0.1, "{off} of the light");
+    difference(&rays, &distributions)
+}
+
+/// The rougher a mesh is the more of its facets share a distribution, and are shown as they would be.
+#[test]
+fn rough_meshes_have_fewer_distributions() {
+    let [polished, rough] = [0.2, 0.9].map(|roughness| solved(&ball(64, roughness)));
+    let [many, few] = [&polished, &rough].map(|solved| {
+        let stats = &solved.solution.stats;
+        stats.leaves - stats.skipped.joined_leaves
+    });
+    assert!(3 * few < 2 * many, "{few} of rough leaves, {many} of polished ones");
+    let off = distributions_are_off(&rough);
+    assert!(off < 0.05, "{off} of the light");
 }
