@@ -2,7 +2,7 @@
 //! in order, whatever the number of threads. For extensions, too.
 //!
 //! Closures pass to the pool as `dyn`, a run of items at a time, so that what divides work is compiled once, not once for each place
-//! and extension: with rayon's iterators that was most of what a solver for another [`LightField`](crate::LightField) took to build.
+//! and extension: with rayon's iterators that was a third of what a solver for another [`LightField`](crate::LightField) took to build.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
