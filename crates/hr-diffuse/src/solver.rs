@@ -183,7 +183,7 @@ pub struct Solver<L: LightField = ()> {
     /// diffuse light.
     pub(crate) faint: Vec<Rgb>,
     /// By material: what is reflected beside the diffuse part as directional light.
-    strong: Vec<Rgb>,
+    pub(crate) strong: Vec<Rgb>,
     /// By leaf, what it sends of the extension's light.
     pub(crate) sent: Vec<Sent>,
     /// Directional light of leaves as it is to be shown: in its own detail, also where it stands for others.

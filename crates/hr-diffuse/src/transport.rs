@@ -45,7 +45,8 @@ pub struct Exitant {
     pub senders: Senders,
     /// Node whose leaves stand for a node: itself, or the nearest ancestor that sent when light was last reflected.
     pub reflected_as: Vec<u32>,
-    /// Factor, at most 1, for directional light, which keeps what links carry from exceeding what there is.
+    /// Factor for directional light, which makes what links carry together what there is: at most 1.5, and 1 for all but where
+    /// neighbours carry too much.
     pub gain: Vec<f32>,
     /// Most radiance (max channel, any direction) of the leaves that stand for a node.
     pub peak: Vec<f32>,
@@ -177,6 +178,7 @@ impl<L: LightField> Light<'_, L> {
             let holder = self.element(state);
             // Intensity per area is at most the mean cosine times radiance, and that is at most 1.
             let scale = if holder.is_flat() { PI } else { PI / holder.mean_cosine(away.axis).max(0.25) };
+            let gain = self.exitant.gain[sender as usize].max(1.0);
             for &Representative { leaf, share, strength } in self.exitant.senders.of(state) {
                 let (least, most) = self.field.radiance_bounds(&self.reflected[leaf as usize], away);
                 let part = self.element(leaf);
@@ -185,7 +187,7 @@ impl<L: LightField> Light<'_, L> {
                 let scale = strength * (share * scale);
                 let (dim, bright) = (dim.max(0.0) * scale, bright.max(0.0) * scale);
                 low += least.max(Rgb::ZERO) * dim + least.min(Rgb::ZERO) * bright;
-                high += most.max(Rgb::ZERO) * bright;
+                high += most.max(Rgb::ZERO) * (bright * gain);
             }
         }
         (low.max(Rgb::ZERO), high.max(Rgb::ZERO))
@@ -221,6 +223,7 @@ impl<L: LightField> Light<'_, L> {
             return 0.0;
         }
         let peak = self.exitant.peak[self.exitant.reflected_as[sender as usize] as usize];
+        let peak = peak * self.exitant.gain[sender as usize].max(1.0);
         peak * if element.is_flat() { PI } else { 4.0 * PI }
     }
 
