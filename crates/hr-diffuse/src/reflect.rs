@@ -273,7 +273,7 @@ impl<L: LightField> Solver<L> {
             let irradiance = new.unwrap_or(&self.exitant.irradiance);
             self.feedback.fit(self.elements.nodes.len());
             let carried = (gather.directional(), gather.lit());
-            let arrived = (&irradiance[..], &self.strong[..]);
+            let arrived: (&[Rgb], &[Rgb]) = (irradiance, &self.strong);
             self.exitant.gain = gains(self.light(), &self.links, carried, self.feedback.most(), arrived);
         }
         (self.gather, self.shot) = (gather, shot);

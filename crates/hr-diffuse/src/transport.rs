@@ -164,7 +164,8 @@ impl<L: LightField> Light<'_, L> {
     }
 
     /// Smallest and largest [`emitted`](Self::emitted) over a cone of directions away from the sender, for nodes
-    /// with extent as radiosity (clusters: that of the surfaces inside).
+    /// with extent as radiosity (clusters: that of the surfaces inside); before [`Exitant::gain`], which is known only of the links
+    /// that there are, not of those that they are to be refined to.
     #[must_use]
     pub fn emitted_bounds(&self, sender: u32, away: &Cone) -> (Rgb, Rgb) {
         let element = self.element(sender);
@@ -178,7 +179,6 @@ impl<L: LightField> Light<'_, L> {
             let holder = self.element(state);
             // Intensity per area is at most the mean cosine times radiance, and that is at most 1.
             let scale = if holder.is_flat() { PI } else { PI / holder.mean_cosine(away.axis).max(0.25) };
-            let gain = self.exitant.gain[sender as usize].max(1.0);
             for &Representative { leaf, share, strength } in self.exitant.senders.of(state) {
                 let (least, most) = self.field.radiance_bounds(&self.reflected[leaf as usize], away);
                 let part = self.element(leaf);
@@ -187,7 +187,7 @@ impl<L: LightField> Light<'_, L> {
                 let scale = strength * (share * scale);
                 let (dim, bright) = (dim.max(0.0) * scale, bright.max(0.0) * scale);
                 low += least.max(Rgb::ZERO) * dim + least.min(Rgb::ZERO) * bright;
-                high += most.max(Rgb::ZERO) * (bright * gain);
+                high += most.max(Rgb::ZERO) * bright;
             }
         }
         (low.max(Rgb::ZERO), high.max(Rgb::ZERO))
