@@ -177,21 +177,21 @@ mod tests {
             (node.is_patch() && four.iter().all(|&part| nodes[part].child_count == 0)).then_some(four)
         };
         let [one, others @ ..] = nodes.iter().find_map(leaves).expect("floor or ceiling are divided");
-        // Each of the four has light of 1; what is left of what all of them carry, where 1.4 is left of what the first does.
+        // Each of the four has light of 1; what is left of what all of them carry, where as much as a leaf may freely send is left of what the first does.
         let left = |first: f32, other: f32, most: f32| {
             let (mut carried, mut gains) = (vec![0.0; nodes.len()], vec![1.0; nodes.len()]);
-            (carried[one], gains[one]) = (first, 1.4 / first);
+            (carried[one], gains[one]) = (first, FREELY / first);
             others.iter().for_each(|&part| carried[part] = other);
             let is_leaf = |node: usize| nodes[node].child_count == 0;
             let all_most: Vec<f32> = (0..nodes.len()).map(|node| if is_leaf(node) { most } else { FREELY }).collect();
-            let sent = |node: usize| Rgb::new(nodes[one].area.recip(), 0.0, 0.0) * f32::from(node != 0);
+            let sent = |_| Rgb::new(nodes[one].area.recip(), 0.0, 0.0);
             make_up(nodes, &carried, &all_most, sent, &mut gains);
             gains.iter().zip(&carried).map(|(gain, carried)| gain * carried).sum::<f32>()
         };
         for (name, found, expected) in [
             ("all that was cut off", left(2.0, 0.2, FREELY), 2.6),
             ("no more than there is", left(4.0, 0.7, FREELY), 4.0),
-            ("not without bound", left(3.9, 0.0, FREELY), 1.4 * MOST_MADE_UP),
+            ("not without bound", left(3.9, 0.0, FREELY), FREELY * MOST_MADE_UP),
             ("nothing where light went on growing", left(2.0, 0.2, STRICTLY), 2.0),
         ] {
             assert!((found - expected).abs() < 1e-3, "{name}: {found} instead of {expected}");

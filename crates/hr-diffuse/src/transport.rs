@@ -45,8 +45,8 @@ pub struct Exitant {
     pub senders: Senders,
     /// Node whose leaves stand for a node: itself, or the nearest ancestor that sent when light was last reflected.
     pub reflected_as: Vec<u32>,
-    /// Factor for directional light, which makes what links carry together what there is: at most 1.5, and 1 for all but where
-    /// neighbours carry too much.
+    /// Factor for directional light, which makes what links carry together what there is: less than 1 where
+    /// those of a sender carry too much, more than 1, at most 1.5, beside it.
     pub gain: Vec<f32>,
     /// Most radiance (max channel, any direction) of the leaves that stand for a node.
     pub peak: Vec<f32>,
