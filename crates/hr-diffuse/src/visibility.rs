@@ -4,7 +4,7 @@
 //! hold the outlines of polygons, which is all that a test needs; curved surfaces are tested in f64 through their
 //! [`Geometry`]. No ray allocates, and every query is a pure function: results do not depend on the thread.
 
-use crate::geometry::{Aabb, Domain, Geometry, Outline};
+use crate::geometry::{Aabb, Domain, Geometry, Outline, slabs};
 use crate::sealed::Side;
 use crate::threads;
 use crate::tree::{Leaves, tree};
@@ -20,13 +20,6 @@ const END_TRIM: f32 = 1e-5;
 /// The trim of a segment shorter than [`END_TRIM`]/this is this share of its length, but at least
 /// [`Aabb::ROUNDING`]: what stands between two near patches must still block.
 const END_TRIM_SHARE: f32 = 1e-3;
-
-/// Growth of a box's far distance that makes the slab test conservative: three roundings on each side (Ize, "Robust
-/// BVH Ray Traversal", JCGT 2(2), 2013), generously.
-const SLAB_GROWTH: f32 = 1.0 + 8.0 * f32::EPSILON;
-
-/// In place of a zero direction component: small enough to be parallel, large enough for a finite reciprocal.
-const PARALLEL: f32 = 1e-30;
 
 /// The "no blocker yet" value of the cache that [`Visibility::occluded`] keeps.
 pub const NO_BLOCKER: u32 = u32::MAX;
@@ -141,7 +134,7 @@ struct Ray {
 
 impl Ray {
     fn new(origin: Vec3, direction: Vec3) -> Self {
-        let reciprocal = direction.map(|d| if d.abs() < PARALLEL { PARALLEL.copysign(d) } else { d }.recip());
+        let reciprocal = slabs::reciprocal(direction);
         let axis = |i: usize| 2 * i + usize::from(reciprocal[i] < 0.0);
         Self {
             origins: [0, 1, 2].map(|i| Vec4::splat(origin[i])),
@@ -156,7 +149,7 @@ impl Ray {
         let [x, y, z] = self.near;
         let slab = |bound: usize, axis: usize| (node.bounds[bound] - self.origins[axis]) * self.reciprocals[axis];
         let near = slab(x, 0).max(slab(y, 1)).max(slab(z, 2)).max(Vec4::splat(t_min));
-        let far = slab(x ^ 1, 0).min(slab(y ^ 1, 1)).min(slab(z ^ 1, 2)) * SLAB_GROWTH;
+        let far = slab(x ^ 1, 0).min(slab(y ^ 1, 1)).min(slab(z ^ 1, 2)) * slabs::GROWTH;
         (near, near.cmple(far.min(Vec4::splat(t_max))).bitmask())
     }
 }

@@ -83,18 +83,29 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     /// Nodes that glow, rising.
     glowing: Vec<u32>,
     /// By node, which emitters light it; found out of leaves where it is asked for.
-    nearby: Vec<OnceLock<Box<Nearby>>>,
+    nearby: Vec<OnceLock<Box<Lights>>>,
     even: AtomicU64,
     smooth: AtomicU64,
+    half_shadows: AtomicU64,
 }
 
-/// Pixels that see one polygon and were spared rays for it.
+/// What pixels were spared: most of those that see one polygon need fewer rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Spared {
     /// Those for which no ray looked for edges.
     pub even_pixels: u64,
     /// Those that have one ray, in their middle, as they differ little from those beside them.
     pub smooth_pixels: u64,
+    /// Rays of pixels that met a leaf in even half shadow, where none were sent to emitters.
+    pub half_shadows: u64,
+}
+
+/// What is known of the emitters that light a leaf.
+#[derive(Debug)]
+struct Lights {
+    nearby: Nearby,
+    /// Whether vertices know as much as rays would tell: half shadow all over.
+    are_even: bool,
 }
 
 /// A point that a ray met.
@@ -195,6 +206,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             nearby,
             even: AtomicU64::new(0),
             smooth: AtomicU64::new(0),
+            half_shadows: AtomicU64::new(0),
         }
     }
 
@@ -229,8 +241,9 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// What the pixels of all pictures so far did without.
     #[must_use]
     pub fn spared(&self) -> Spared {
-        let [even_pixels, smooth_pixels] = [&self.even, &self.smooth].map(|count| count.load(Ordering::Relaxed));
-        Spared { even_pixels, smooth_pixels }
+        let [even_pixels, smooth_pixels, half_shadows] =
+            [&self.even, &self.smooth, &self.half_shadows].map(|count| count.load(Ordering::Relaxed));
+        Spared { even_pixels, smooth_pixels, half_shadows }
     }
 
     /// To be printed or not: rays by which a print has less noise do not enter the image.
@@ -469,9 +482,33 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         if self.mode != Mode::Samples || bounce > 0 || self.followed <= 0.0 {
             return self.solution.irradiance(leaf, hit.uv);
         }
-        let nearby = if self.tracer.emitters().len() <= MOST_NEARBY { self.nearby(hit) } else { None };
+        let lights = if self.tracer.emitters().len() <= MOST_NEARBY { self.lights(leaf) } else { None };
+        if lights.is_some_and(|lights| lights.are_even) {
+            self.half_shadows.fetch_add(1, Ordering::Relaxed);
+            return self.solution.irradiance(leaf, hit.uv);
+        }
+        let nearby = lights.map(|lights| &lights.nearby);
         let direct = self.tracer.irradiance(hit, direction.normalize(), sampler, nearby);
         self.solution.indirect_irradiance(leaf, hit.uv) + direct
+    }
+
+    /// What is known of the emitters that light a leaf, found out where it is asked for.
+    fn lights(&self, leaf: NodeId) -> Option<&Lights> {
+        let lights = self.nearby.get(leaf.index())?.get_or_init(|| {
+            let element = &self.solution.elements.nodes[leaf.index()];
+            let place = Lit { surface: element.source, domain: element.domain, back: element.kind == Kind::Back };
+            let visibility = &self.solution.scene.visibility;
+            let nearby = Nearby::new(self.tracer.emitters(), visibility, &place, leaf.0);
+            let geometry = &visibility.geometries()[element.source as usize];
+            let direct = |k: u32| {
+                let uv = geometry.domain_point(element.domain, 0.5 * (k % 3) as f32, 0.5 * (k / 3) as f32);
+                let [all, indirect] = [self.solution.irradiance(leaf, uv), self.solution.indirect_irradiance(leaf, uv)];
+                (all - indirect).element_sum()
+            };
+            let are_even = nearby.is_even_half_shadow((0..9).map(direct));
+            Box::new(Lights { nearby, are_even })
+        });
+        Some(lights)
     }
 
     /// A point that a ray met, which is reflected by this reflector.
@@ -581,12 +618,7 @@ impl<B: Basis> Known for RayCaster<'_, B> {
 
     fn nearby(&self, hit: &Hit) -> Option<&Nearby> {
         let leaf = self.solution.leaf(hit)?;
-        let nearby = self.nearby.get(leaf.index())?.get_or_init(|| {
-            let element = &self.solution.elements.nodes[leaf.index()];
-            let place = Lit { surface: element.source, domain: element.domain, back: element.kind == Kind::Back };
-            Box::new(Nearby::new(self.tracer.emitters(), &self.solution.scene.visibility, &place, leaf.0))
-        });
-        Some(nearby)
+        Some(&self.lights(leaf)?.nearby)
     }
 
     fn glowing(&self, hit: &Hit) -> Option<u32> {
@@ -665,7 +697,9 @@ fn glow<B: Basis>(solution: &Solution<GlossyField<B>>, node: u32, light: f32) ->
 mod tests {
     use super::*;
     use crate::solved::{Purpose, Solved, Wanted as Wait};
-    use hr_diffuse::Settings;
+    use glossy_ext::Lambert;
+    use hr_diffuse::{Settings, Shape, Surface};
+    use std::f64::consts::FRAC_1_SQRT_2;
 
     /// Where a quarter of the rays that look for edges meets what the pixel saw, the others bring next to nothing; so do all rays but one
     /// where one polygon is seen.
@@ -713,5 +747,70 @@ mod tests {
         let spared = caster.spared();
         assert!(spared.even_pixels > 100 && spared.smooth_pixels > 300, "{spared:?}");
         assert!(off < 2e-3 * light && most < 0.05, "{:.5} of the light, of a pixel {most}", off / light);
+    }
+
+    /// A ground below slats that hide all but a fifth of a wide lamp, as of a sky behind blinds, and how a camera sees it.
+    fn below_slats() -> (Scene, Camera) {
+        let quad = |x: [f64; 2], y: [f64; 2], z: [f64; 2]| {
+            let p = |i: usize, j: usize| DVec3::new(x[i], y[j], z[i]);
+            Shape::Quad([p(0, 0), p(1, 0), p(1, 1), p(0, 1)])
+        };
+        let mut surfaces = vec![
+            Surface::new(quad([-1.0, 1.0], [-1.0, 1.0], [0.0; 2]), 0),
+            Surface { flip: true, ..Surface::new(quad([-2.0, 2.0], [-2.0, 2.0], [1.2; 2]), 1) },
+        ];
+        surfaces.extend((-40..40).map(|i| {
+            let x = (f64::from(i) + 0.5) / 20.0;
+            Surface::new(quad([x - 0.02, x + 0.02], [-2.0, 2.0], [1.0; 2]), 0)
+        }));
+        let material = |reflectance, exitance| Material {
+            name: String::new(),
+            reflector: Arc::new(Lambert::new(Rgb::splat(reflectance)).expect("a reflectance")),
+            exitance: Rgb::splat(exitance),
+            two_sided: true,
+            texture: None,
+            base_color: Rgb::ONE,
+        };
+        let scene = Scene { surfaces, materials: vec![material(0.2, 0.0), material(0.0, 10.0)], ..Scene::default() };
+        let [eye, target, up] = [[0.0, -0.9, 0.9], [0.0, 0.0, 0.0], [0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2]];
+        (scene.clone(), Camera { eye, target, up, fov_x: 50.0, width: 48, height: 32, ..scene.default_camera() })
+    }
+
+    /// Where emitters are partly hidden all over a leaf, vertices know their light as well as rays of pixels do, and without noise.
+    #[test]
+    fn half_shadow_is_as_bright_from_vertices_as_from_rays() {
+        let (scene, camera) = below_slats();
+        let scene = Arc::new(scene);
+        let cameras = [camera];
+        let purpose = Purpose { distributions: false, cameras: Some(&cameras[..]) };
+        let settings = Settings::with_error(0.05);
+        let asked = Solved::awaited(Arc::clone(&scene), settings, purpose, &mut |_| Wait::Whole);
+        let solved = asked.expect("a sound scene").0;
+        let caster = || RayCaster::new(&scene, &solved.solution, Mode::Samples);
+        let (believing, mut asking) = (caster(), caster());
+        for (leaf, place) in asking.nearby.iter_mut().enumerate() {
+            if solved.solution.elements.nodes[leaf].is_patch() {
+                let nearby = believing.lights(NodeId(leaf as u32)).map(|lights| lights.nearby.clone());
+                *place = OnceLock::from(Box::new(Lights { nearby: nearby.expect("of all nodes"), are_even: false }));
+            }
+        }
+        let [smooth, noisy] = [&believing, &asking].map(|caster| caster.render(&camera, &|_| ()).pixels);
+        assert!(
+            believing.spared().half_shadows > 1_000 && asking.spared().half_shadows == 0,
+            "{:?}",
+            believing.spared()
+        );
+        // The mean of each quarter, and how much neighbours differ.
+        let quarter = |pixels: &[Rgb], [x, y]: [usize; 2]| -> f32 {
+            (0..24 * 16).map(|i| pixels[(y * 16 + i / 24) * 48 + x * 24 + i % 24].x).sum()
+        };
+        for at in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+            let ratio = quarter(&smooth, at) / quarter(&noisy, at);
+            assert!((ratio - 1.0).abs() < 0.1, "{at:?}: {ratio}");
+        }
+        let all = |pixels: &[Rgb]| pixels.iter().map(|pixel| pixel.x).sum::<f32>();
+        assert!((all(&smooth) / all(&noisy) - 1.0).abs() < 0.05, "{} {}", all(&smooth), all(&noisy));
+        let rough = |pixels: &[Rgb]| pixels.windows(2).map(|pair| (pair[0].x - pair[1].x).abs()).sum::<f32>();
+        assert!(rough(&smooth) < 0.5 * rough(&noisy), "{} {}", rough(&smooth), rough(&noisy));
     }
 }

@@ -15,6 +15,7 @@ mod normalization;
 mod polygon;
 mod revolution;
 mod roots;
+pub(crate) mod slabs;
 #[cfg(test)]
 pub(crate) mod tests;
 

@@ -1,6 +1,6 @@
 //! Triangles and planar convex quadrilaterals.
 
-use super::{Domain, GeometryError, Normalization};
+use super::{Aabb, Domain, GeometryError, Normalization, slabs};
 use glam::{DVec2, DVec3, Vec2, Vec3, Vec4, Vec4Swizzles, vec2};
 
 /// Corners of a quadrilateral may be off the mean plane by this share of the longer diagonal: what decimals of four
@@ -209,7 +209,7 @@ impl Outline {
             return None;
         }
         let t = Vec3::new(x.x, y.x, z.x).dot(self.normal) / along;
-        (t > t_min && t < t_max).then_some(t)
+        (t > t_min && t < t_max && is_toward(&corners, direction)).then_some(t)
     }
 
     /// Whether some edge has the polygon on one side, and on the other all rays from `origin` that run between four `directions`.
@@ -231,6 +231,21 @@ impl Outline {
         let tolerance = Vec4::splat(2.0 * EDGE_TOLERANCE * all);
         if turn > 0.0 { high.cmplt(-tolerance).any() } else { low.cmpgt(tolerance).any() }
     }
+}
+
+/// Whether the line through the origin along a direction passes the box around a polygon, but for rounding. One that runs in
+/// the polygon's plane but far from it may have edge functions that are all rounding, of either sign, and a cosine with the
+/// normal that is the rounding of so small a polygon's corners.
+#[inline]
+fn is_toward(corners: &[Vec4; 3], direction: Vec3) -> bool {
+    let reciprocal = slabs::reciprocal(direction);
+    let (mut near, mut far) = (f32::NEG_INFINITY, f32::INFINITY);
+    for (axis, corner) in corners.iter().enumerate() {
+        let low = (corner.min_element() - Aabb::ROUNDING) * reciprocal[axis];
+        let high = (corner.max_element() + Aabb::ROUNDING) * reciprocal[axis];
+        (near, far) = (near.max(low.min(high)), far.min(low.max(high)));
+    }
+    near <= far * slabs::GROWTH
 }
 
 /// Twice the normals of the planes through the origin and each edge of a polygon.

@@ -301,6 +301,22 @@ fn scenes_that_trees_do_not_like() {
 }
 
 #[test]
+fn rays_in_the_plane_of_a_polygon_far_away_miss_it() {
+    // All edge functions are rounding, and the normal of so small a polygon is not quite perpendicular to the ray.
+    let (from, to) = (vec3(0.0, 1.0, 1.5), vec3(1.0, 0.0, 1.5));
+    let corners = [
+        dvec3(1.0006696043835028, -0.0006696043835028145, 0.18184988397190044),
+        dvec3(0.9997758244255296, 0.00022417557447039182, 0.1827743679369842),
+        dvec3(0.9993303956164972, 0.0006696043835028145, 0.1838419953404749),
+        dvec3(1.000383421823116, -0.0003834218231160005, 0.1826679428122689),
+    ];
+    let visibility = scene([Shape::Quad(corners)]);
+    assert_eq!(visibility.geometries()[0].distance(from, to - from, 0.0, 1.0), None);
+    // As the surface that blocked last it is tested first, without its box.
+    assert!(!visibility.occluded(from, to, [NO_BLOCKER; 2], &mut 0));
+}
+
+#[test]
 fn ends_just_off_a_surface_see_it() {
     // A lid a ten-thousandth above the floor hides it: the trim at the ends must not swallow it.
     let lid = Shape::Quad([dvec3(0.0, 0.0, 1e-4), dvec3(1.0, 0.0, 1e-4), dvec3(1.0, 1.0, 1e-4), dvec3(0.0, 1.0, 1e-4)]);

@@ -44,6 +44,10 @@ const MUCH: f32 = 0.01;
 const LEAST_SEEN: f32 = 0.1;
 /// Emitters that bring less than this of all are left to power.
 const FAINT: f32 = 1e-4;
+/// Half shadow is even where what is seen differs by less than this share of an emitter …
+const UNEVEN: f32 = 0.15;
+/// … and is less than this share.
+const LIGHT: f32 = 0.9;
 /// Cosine that counts at least: shading normals are bent, and places are large.
 const LEAST_COSINE: f32 = 0.05;
 
@@ -67,6 +71,9 @@ pub struct Nearby {
     sums: Vec<f32>,
     /// Share of each that is seen, about, > 0.
     seen: Vec<f32>,
+    /// Least irradiance, sum of channels, that one of those which bring much would bring were nothing between; 0 if some of them are
+    /// seen by all rays.
+    half_shadow: f32,
 }
 
 /// An emitter that is looked at.
@@ -151,6 +158,11 @@ impl Nearby {
         for Found { light, seen, .. } in &mut found {
             *light *= *seen;
         }
+        let most: f32 = found.iter().map(|found| found.light).sum();
+        let strong = found.iter().filter(|found| found.light >= STRONG * most);
+        let half_shadow = strong.fold(f32::INFINITY, |least, found| {
+            least.min(if found.seen < 1.0 { found.light / found.seen } else { 0.0 })
+        });
         let total: f32 = found.iter().map(|found| found.light).sum();
         found.retain(|found| found.light > FAINT * total && found.light.is_finite());
         found.sort_unstable_by_key(|found| found.entry);
@@ -164,7 +176,16 @@ impl Nearby {
             sums: found.iter().map(add).collect(),
             entries: found.iter().map(|found| found.entry).collect(),
             seen: found.iter().map(|found| found.seen).collect(),
+            half_shadow,
         }
+    }
+
+    /// Whether emitters that are all partly seen light the place about evenly, by what they are said to bring (irradiance, sum of
+    /// channels) to points all over it: nothing so fine throws shadows on it that one would see.
+    #[must_use]
+    pub fn is_even_half_shadow(&self, brought: impl Iterator<Item = f32>) -> bool {
+        let (low, high) = brought.fold((f32::INFINITY, 0.0f32), |(low, high), light| (low.min(light), high.max(light)));
+        high > 0.0 && high - low < UNEVEN * self.half_shadow && high < LIGHT * self.half_shadow
     }
 
     /// The emitters that bring much, of which some ray saw something, and the share that is seen of each.
