@@ -773,7 +773,7 @@ mod tests {
         };
         let scene = Scene { surfaces, materials: vec![material(0.2, 0.0), material(0.0, 10.0)], ..Scene::default() };
         let [eye, target, up] = [[0.0, -0.9, 0.9], [0.0, 0.0, 0.0], [0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2]];
-        (scene.clone(), Camera { eye, target, up, fov_x: 50.0, width: 48, height: 32, ..scene.default_camera() })
+        (scene.clone(), Camera { eye, target, up, fov_x: 50.0, width: 48, height: 32 })
     }
 
     /// Where emitters are partly hidden all over a leaf, vertices know their light as well as rays of pixels do, and without noise.
