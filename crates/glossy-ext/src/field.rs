@@ -33,8 +33,8 @@ const FINEST: f32 = 0.85;
 const WIDE: f32 = 4.0;
 /// Slope of the lobe that stands for a perfect mirror in light transport.
 const MIRROR_ALPHA: f32 = 0.03;
-/// A leaf's glossy part reflects at most this times its mean albedo: directions differ, and a smooth dielectric with a white
-/// diffuse part under it may reflect more than all of what grazes it.
+/// A leaf's glossy part reflects no more than what the diffuse one leaves, or, if that is more, this times its mean albedo: a smooth
+/// dielectric with a white diffuse part under it reflects more than all of what grazes it.
 const MOST_GAIN: f32 = 1.15;
 /// Distributions that have less power than this share of what the mean albedo makes of an irradiance are not scaled to all they lack.
 const LEAST_POWER: f32 = 0.25;
@@ -480,7 +480,9 @@ impl Reflection<'_> {
             if self.flat { exitant.cosine_integral(self.place.normal()) } else { exitant.integral() }
         };
         let (mut power, mean) = (power_of(exitant), (self.material.albedo * irradiance).element_sum());
-        let made = self.material.reflected(&self.incident).element_sum().min(MOST_GAIN * mean);
+        let left = (Rgb::ONE - self.material.reflector.diffuse()).max(Rgb::ZERO);
+        let most = (MOST_GAIN * mean).max((left * irradiance).element_sum());
+        let made = self.material.reflected(&self.incident).element_sum().min(most);
         let excess = power.element_sum() - made;
         if excess > UNNOTICED * made && power.min_element() >= 0.0 {
             let by = power * (excess / power.element_sum() / if self.flat { PI } else { 2.0 * PI });

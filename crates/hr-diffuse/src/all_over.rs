@@ -5,6 +5,7 @@
 
 use crate::hierarchy::{Element, Kind};
 use crate::hooks::LightField;
+use crate::toward::Detail;
 use crate::transport::Light;
 use glam::Vec3;
 use smallvec::SmallVec;
@@ -66,7 +67,7 @@ impl<L: LightField> Light<'_, L> {
         if self.emitted_most(sender) <= 0.0 {
             return;
         }
-        let at = |x: Vec3, n: Vec3| self.arriving_at(x, n, sender, spots.negligible).0.element_sum();
+        let at = |x: Vec3, n: Vec3| self.arriving_at(x, n, sender, Detail::carried(spots.negligible)).0.element_sum();
         if element.kind != Kind::Light && spots.is_far(element) {
             let (x, n) = spots.middle;
             if let Some(values) = spots.by_middle(element, at(x, n)) {
@@ -103,7 +104,7 @@ mod tests {
             far += u32::from(spots.is_far(sender));
             let at_once = light.arriving_all_over(spots, link.sender);
             for (at_once, &(x, n, weight)) in at_once.into_iter().zip(&points) {
-                let by_point = light.arriving_at(x, n, link.sender, 0.0).0.element_sum();
+                let by_point = light.arriving_at(x, n, link.sender, Detail::carried(0.0)).0.element_sum();
                 off += weight * receiver.area * (at_once - by_point).abs();
                 all += weight * receiver.area * by_point;
             }

@@ -11,6 +11,7 @@ use crate::links::{Link, Links};
 use crate::push::{Spread, visible};
 use crate::sampling::{hash, point2, unit};
 use crate::segments::{receiving_point, visibility_at};
+use crate::toward::Detail;
 use crate::transport::Light;
 use glam::Vec3;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -95,7 +96,8 @@ impl<L: LightField> Hierarchy for Closely<'_, L> {
     }
     fn look(&self, leaf: NodeId, sender: NodeId, rays: u32) -> Option<Rgb> {
         let element = self.light.element(leaf.0);
-        let (irradiance, _) = self.light.arriving_at(element.center, element.normals.axis, sender.0, 0.0);
+        let (irradiance, _) =
+            self.light.arriving_at(element.center, element.normals.axis, sender.0, Detail::carried(0.0));
         if irradiance == Rgb::ZERO {
             return Some(irradiance);
         }

@@ -18,6 +18,7 @@ use crate::places::{Edges, Places};
 use crate::sampling::hash;
 use crate::segments::{receiving_point, visibility};
 use crate::threads;
+use crate::toward::Detail;
 use crate::transport::{Light, negligible};
 use crate::visibility::Proof;
 use glam::{Vec2, Vec3};
@@ -473,7 +474,7 @@ impl Place {
     /// The same of a sender that is far, by what arrives in the middle.
     fn by_middle<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
         let (x, n, _) = self.middle;
-        let value = light.arriving_at(x, n, link.sender, self.negligible).0.element_sum();
+        let value = light.arriving_at(x, n, link.sender, Detail::carried(self.negligible)).0.element_sum();
         if light.element(self.node).is_patch() || light.elements.is_distant(NodeId(link.sender)) {
             return Weight { value, ..Weight::default() };
         }
@@ -538,7 +539,8 @@ impl Place {
             self.by_middle(light, link)
         } else {
             let direction = light.direction_to(element.center, link.sender);
-            let (irradiance, _) = light.arriving_at(element.center, direction, link.sender, self.negligible);
+            let (irradiance, _) =
+                light.arriving_at(element.center, direction, link.sender, Detail::carried(self.negligible));
             let value = irradiance.element_sum() * element.mean_cosine(direction);
             Weight { value, ..Weight::default() }
         };

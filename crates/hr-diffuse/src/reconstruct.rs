@@ -19,6 +19,7 @@ use crate::sampling::hash;
 use crate::segments::visibility_at;
 use crate::solution::Seen;
 use crate::threads;
+use crate::toward::Detail;
 use crate::transport::{Light, negligible};
 use crate::vertices::{Vertices, outlines_of_parts, point_on};
 use crate::within::Within;
@@ -259,7 +260,7 @@ fn gather_at<L: LightField>(
     let mut total: f32 = inherited.iter().map(|brought| brought.irradiance.max_element()).sum();
     let mut look = |at: usize| {
         let link = &links.all()[at];
-        let (irradiance, share) = light.arriving_at(x, n, link.sender, negligible);
+        let (irradiance, share) = light.arriving_at(x, n, link.sender, Detail::shown(negligible));
         let most = irradiance.max_element();
         if most > 0.0 {
             total += most * link.visibility.abs().max(0.05);

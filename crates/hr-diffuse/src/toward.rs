@@ -8,6 +8,7 @@ use crate::hierarchy::Kind;
 use crate::hooks::LightField;
 use crate::push::sample_points;
 use crate::reflect::Representative;
+use crate::sampling::{cosine_direction, point2};
 use crate::transport::Light;
 use glam::Vec3;
 use smallvec::{SmallVec, smallvec};
@@ -22,6 +23,38 @@ const SPREAD: f32 = 0.577;
 const PAIRS: usize = 16;
 /// Of what is not flat, light is divided by a mean cosine of at least this: near the terminator both fade.
 const LEAST_COSINE: f32 = 0.05;
+
+/// A point lies beside a flat sender if it is no higher above it than this share of its radius …
+const BESIDE: f32 = 0.25;
+/// … and sees at least so much of it (the form factor).
+const LARGE: f32 = 0.1;
+/// It looks in so many directions that about this number meets the sender, …
+const MET: f32 = 32.0;
+/// … and takes what they say if at least so many do.
+const LEAST_MET: usize = 3;
+/// All points look in the same directions, so that what they find changes smoothly.
+const SAME_DIRECTIONS: u32 = 0x2f1d;
+
+/// How closely light that arrives at a point is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Detail {
+    /// What brings no more than this (W/m²) is looked at less closely.
+    pub(crate) negligible: f32,
+    /// Whether the point is shown. What is right on average along an edge makes spots there.
+    pub(crate) shown: bool,
+}
+
+impl Detail {
+    /// For light on its way.
+    pub(crate) fn carried(negligible: f32) -> Self {
+        Self { negligible, shown: false }
+    }
+
+    /// For what is seen.
+    pub(crate) fn shown(negligible: f32) -> Self {
+        Self { negligible, shown: true }
+    }
+}
 
 /// A point that stands for a part of a node, its normal (zero where it has none), and its weight.
 type Point = (Vec3, Vec3, f32);
@@ -46,14 +79,45 @@ impl<L: LightField> Light<'_, L> {
         self.mean_directional(sender, away, &points)
     }
 
-    /// The same on the way to a point with normal `n`: the mean over the sender. Senders that bring less than `negligible` through
+    /// The same on the way to a point with normal `n`: the mean over the sender. Senders that bring less than what is negligible through
     /// this form factor are asked for one direction.
-    pub(crate) fn directional_at(&self, sender: u32, (x, n): (Vec3, Vec3), (factor, negligible): (f32, f32)) -> Rgb {
+    pub(crate) fn directional_at(&self, sender: u32, (x, n): (Vec3, Vec3), (factor, detail): (f32, Detail)) -> Rgb {
         let away = -self.direction_to(x, sender);
-        if !self.is_wide(sender, x, 0.0) || self.directional_most(sender) * factor <= negligible {
+        if !self.is_wide(sender, x, 0.0) || self.directional_most(sender) * factor <= detail.negligible {
             return self.directional(sender, away);
         }
-        self.mean_directional(sender, away, &[(x, n, 1.0)])
+        let seen = detail.shown.then(|| self.seen_beside(sender, (x, n), factor)).flatten();
+        seen.unwrap_or_else(|| self.mean_directional(sender, away, &[(x, n, 1.0)]))
+    }
+
+    /// The same by the directions in which a point sees a flat sender that it lies close beside, as in a corner of a room: half of what it
+    /// sees is the strip next to it, at any angle. Points of the sender would show but the rest, along the surface. `None` where
+    /// it is not so.
+    fn seen_beside(&self, sender: u32, (x, n): (Vec3, Vec3), factor: f32) -> Option<Rgb> {
+        let element = self.element(sender);
+        let is_beside = (x - element.center).dot(element.normals.axis) < BESIDE * element.radius;
+        let standing = self.exitant.senders.of(self.exitant.reflected_as[sender as usize]);
+        if !is_beside || factor < LARGE || !element.is_flat() || standing.is_empty() {
+            return None;
+        }
+        let geometry = &self.scene.surfaces()[element.source as usize];
+        let (mut sum, mut all, mut met) = (Rgb::ZERO, 0.0, 0);
+        for i in 0..(MET / factor) as u32 {
+            let u = point2(SAME_DIRECTIONS, i);
+            let toward = cosine_direction(n, u.x, u.y);
+            if toward.dot(element.normals.axis) >= 0.0 {
+                continue;
+            }
+            let hit = geometry.intersect(x, toward, 0.0, f32::MAX);
+            if hit.is_some_and(|(_, uv)| geometry.contains(element.domain, uv)) {
+                let Representative { leaf, share, strength } = standing[met % standing.len()];
+                sum += self.field.radiance(&self.reflected[leaf as usize], -toward) * strength * share;
+                all += share;
+                met += 1;
+            }
+        }
+        let share: f32 = standing.iter().map(|standing| standing.share).sum();
+        (met >= LEAST_MET && all > 0.0).then(|| sum * (PI * share / all))
     }
 
     /// Whether a sender and what is within a radius of a point are so near that more than their middles count.
@@ -208,13 +272,46 @@ mod tests {
             let off = [
                 (single - truth).abs(),
                 (light.directional_toward(sender, receiver).x - truth).abs(),
-                (light.directional_at(sender, (x, n), (1.0, 0.0)).x - brute_force(&solver, nodes, Some(x))).abs(),
+                (light.directional_at(sender, (x, n), (1.0, Detail::carried(0.0))).x
+                    - brute_force(&solver, nodes, Some(x)))
+                .abs(),
             ];
             worst.iter_mut().zip(off).for_each(|(worst, off)| *worst = worst.max(off));
         }
         let [single, toward, at] = worst;
         assert!(single > 0.5, "one direction is not enough: {single} of the peak");
         assert!(toward < 0.05 && at < 0.1, "{toward}, {at} of the peak; {single} by one direction");
+    }
+
+    /// A point of a wall next to a floor that sends most along itself, as what is smooth does of light from afar.
+    #[test]
+    fn points_in_corners_see_what_is_next_to_them() {
+        let (solver, [sender, _]) = squares(0.0, Vec3::new(-1.0, 0.0, 0.1), 8.0);
+        let light = solver.light();
+        let element = light.element(sender);
+        let floor = &solver.scene.surfaces()[element.source as usize];
+        for height in [0.005, 0.02, 0.05] {
+            let (x, n) = (floor.sample(element.domain, 0.0, 0.5).0 + Vec3::Z * (height * element.radius), Vec3::X);
+            let (mut sum, mut all) = (0.0, 0.0);
+            // Squares of steps: fine next to the wall.
+            let steps = 600;
+            for i in 0..steps * steps {
+                let [u, v] = [i / steps, i % steps].map(|k| (k as f32 + 0.5) / steps as f32);
+                let (s, m) = floor.sample(element.domain, u * u, v);
+                let toward = (s - x).normalize();
+                let kernel = u * toward.dot(n).max(0.0) * (-toward).dot(m).max(0.0) / s.distance_squared(x);
+                all += kernel;
+                sum += kernel * PI * solver.field.radiance(&(), -toward).x;
+            }
+            let (truth, factor) = (sum / all, light.factor_at(x, n, sender));
+            let [carried, shown] = [Detail::carried(0.0), Detail::shown(0.0)]
+                .map(|detail| light.directional_at(sender, (x, n), (factor, detail)).x);
+            assert!((shown / truth - 1.0).abs() < 0.15, "{shown} of {truth} at {height}");
+            assert!(
+                (carried / truth - 1.0).abs() > 0.3,
+                "{carried} of {truth} by points, which are enough then, at {height}"
+            );
+        }
     }
 
     /// Where little is at stake, or both ends are far from each other, one direction is asked for.
@@ -224,8 +321,8 @@ mod tests {
         let light = solver.light();
         let single = light.directional(sender, Vec3::Z);
         let (x, n) = (light.element(receiver).center, light.element(receiver).normals.axis);
-        assert_ne!(light.directional_at(sender, (x, n), (1.0, 0.9)), single);
-        assert_eq!(light.directional_at(sender, (x, n), (1.0, 1.1)), single, "at most 1 is sent");
+        assert_ne!(light.directional_at(sender, (x, n), (1.0, Detail::carried(0.9))), single);
+        assert_eq!(light.directional_at(sender, (x, n), (1.0, Detail::carried(1.1))), single, "at most 1 is sent");
         assert!(light.is_wide(sender, x, 0.5) && !light.is_wide(sender, Vec3::splat(100.0), 0.5));
     }
 
@@ -239,7 +336,7 @@ mod tests {
             solver.exitant.directional[sender as usize] = Rgb::splat(mean);
             let light = solver.light();
             let (x, n) = (light.element(receiver).center, light.element(receiver).normals.axis);
-            let with = |negligible: f32| light.arriving_at(x, n, sender, negligible);
+            let with = |negligible: f32| light.arriving_at(x, n, sender, Detail::carried(negligible));
             assert_eq!(with(looked), with(0.0), "exponent {exponent}");
             let (evenly, share) = with(taken_evenly);
             assert_eq!(evenly, Rgb::splat(mean) * share, "exponent {exponent}");

@@ -7,6 +7,7 @@ use crate::hooks::{Hierarchy, LightField, NodeId};
 use crate::links::Link;
 use crate::misjudged::Misjudged;
 use crate::reflect::{Representative, Senders};
+use crate::toward::Detail;
 use crate::{Cone, Facing, LightKind, Rgb};
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -288,28 +289,28 @@ impl<L: LightField> Light<'_, L> {
     /// near are resolved into their parts.
     #[must_use]
     pub fn irradiance_at(&self, x: Vec3, n: Vec3, sender: u32) -> Rgb {
-        self.arriving_at(x, n, sender, 0.0).0
+        self.arriving_at(x, n, sender, Detail::carried(0.0)).0
     }
 
     /// What [`irradiance_at`](Self::irradiance_at) returns, and the share of its view (cosine-weighted hemisphere) that
     /// the sender takes up at the point if nothing is in between; 0 for lights without extent. The shares of all that
-    /// a point really sees never sum to more than 1. Senders that are not likely to bring more than `negligible` (max channel)
+    /// a point really sees never sum to more than 1. Senders that are not likely to bring more than is negligible (max channel)
     /// are taken as points that send evenly.
     #[must_use]
-    pub(crate) fn arriving_at(&self, x: Vec3, n: Vec3, sender: u32, negligible: f32) -> (Rgb, f32) {
+    pub(crate) fn arriving_at(&self, x: Vec3, n: Vec3, sender: u32, detail: Detail) -> (Rgb, f32) {
         let element = self.element(sender);
         let most = self.emitted_most(sender);
         if most <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
         if element.kind != Kind::Light
-            && let Some(weakly) = self.weakly_arriving_at((x, n), sender, most, negligible)
+            && let Some(weakly) = self.weakly_arriving_at((x, n), sender, most, detail.negligible)
         {
             return weakly;
         }
         if let Some(parts) = self.parts_toward(x, sender) {
             return parts.fold((Rgb::ZERO, 0.0), |(light, share), part| {
-                let (more, also) = self.arriving_at(x, n, part, negligible);
+                let (more, also) = self.arriving_at(x, n, part, detail);
                 (light + more, share + also)
             });
         }
@@ -320,7 +321,7 @@ impl<L: LightField> Light<'_, L> {
         let away = self.away(x, sender);
         let light = match element.kind {
             Kind::Light => self.emitted(sender, away),
-            _ => self.together(sender, away, self.directional_at(sender, (x, n), (factor, negligible))),
+            _ => self.together(sender, away, self.directional_at(sender, (x, n), (factor, detail))),
         };
         let light = light * factor;
         let share = match element.kind {

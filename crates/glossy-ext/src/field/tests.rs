@@ -138,6 +138,36 @@ fn coarse_distributions_keep_their_power() {
     assert!(after.abs() < 0.03, "off by {after}, {before} before");
 }
 
+/// What is smooth and dark reflects most of what grazes it, as above a cove; what lies under it takes part of that, if it is white.
+#[test]
+fn what_grazes_a_leaf_is_reflected() {
+    let reflected = |base: f32, z: f32| {
+        let reflector = MetallicRoughness::new(Rgb::splat(base), 0.0, 0.35).expect("a dielectric");
+        let reflector: Arc<dyn Reflector> = Arc::new(reflector);
+        let field = GlossyField::new(&[Arc::clone(&reflector)], Refinement::default());
+        let direction = Vec3::new((1.0 - z * z).sqrt(), 0.0, z);
+        let floor = Floor { points: vec![direction] };
+        let irradiance = Rgb::ONE;
+        let mut incident = SampleSet::new();
+        field.receive(&mut incident, &Transfer { sender: NodeId(1), direction, irradiance, oriented: true });
+        let diffuse = reflector.diffuse() * FRAC_1_PI;
+        let arrived = Arrived { irradiance, diffuse, spread: 0.0, negligible: 0.0, error: 0.1, shown: false };
+        let reflection = field.reflection(&floor, FLOOR, &[&incident], arrived).expect("it is lit");
+        let mut distribution = field.project(&reflection);
+        reflection.conserve(&mut distribution, irradiance);
+        let [mean, albedo] = [reflector.glossy_albedo(), reflector.directional_albedo(direction)].map(|a| a.x);
+        (distribution.cosine_integral(Vec3::Z).x, albedo, mean, 1.0 - reflector.diffuse().x)
+    };
+    for z in [0.1, 0.2, 0.4] {
+        let (found, albedo, mean, _) = reflected(0.0, z);
+        assert!((found / albedo - 1.0).abs() < 0.05, "{found} of {albedo} at {z}");
+        assert!(z > 0.3 || albedo > 2.0 * mean, "much more than the mean: {albedo} and {mean} at {z}");
+    }
+    let (found, albedo, mean, left) = reflected(0.9, 0.1);
+    let most = left.max(MOST_GAIN * mean);
+    assert!(albedo > 1.2 * most && found < 1.01 * most, "{found}, as no more than {most} is left of {albedo}");
+}
+
 /// What is negligible by itself adds up where a distribution is coarse: its tails pay for that, not its highlight.
 #[test]
 fn highlights_do_not_pay_for_coarse_tails() {
