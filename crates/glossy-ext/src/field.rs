@@ -33,9 +33,12 @@ const FINEST: f32 = 0.85;
 const WIDE: f32 = 4.0;
 /// Slope of the lobe that stands for a perfect mirror in light transport.
 const MIRROR_ALPHA: f32 = 0.03;
-/// A leaf's glossy part reflects no more than what the diffuse one leaves, or, if that is more, this times its mean albedo: a smooth
-/// dielectric with a white diffuse part under it reflects more than all of what grazes it.
+/// A leaf's glossy part reflects no more than this times its mean albedo: directions differ, and a smooth dielectric with a white
+/// diffuse part under it may reflect more than all of what grazes it. …
 const MOST_GAIN: f32 = 1.15;
+/// … Lobes that are narrower than this (radians) may have all that the diffuse part leaves: smooth dielectrics reflect many times
+/// their mean of what grazes them, and do so where it can be seen; rough ones spread it along the surface.
+const SMOOTH: f32 = 0.3;
 /// Distributions that have less power than this share of what the mean albedo makes of an irradiance are not scaled to all they lack.
 const LEAST_POWER: f32 = 0.25;
 /// A distribution is scaled up by at most this to add up to what the samples make: one that has missed its lobes shows none.
@@ -481,7 +484,8 @@ impl Reflection<'_> {
         };
         let (mut power, mean) = (power_of(exitant), (self.material.albedo * irradiance).element_sum());
         let left = (Rgb::ONE - self.material.reflector.diffuse()).max(Rgb::ZERO);
-        let most = (MOST_GAIN * mean).max((left * irradiance).element_sum());
+        let grazing = if self.width < SMOOTH { (left * irradiance).element_sum() } else { 0.0 };
+        let most = grazing.max(MOST_GAIN * mean);
         let made = self.material.reflected(&self.incident).element_sum().min(most);
         let excess = power.element_sum() - made;
         if excess > UNNOTICED * made && power.min_element() >= 0.0 {
