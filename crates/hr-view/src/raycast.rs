@@ -83,7 +83,7 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     /// Nodes that glow, rising.
     glowing: Vec<u32>,
     /// By node, which emitters light it; found out of leaves where it is asked for.
-    nearby: Vec<OnceLock<Box<Lights>>>,
+    lights: Vec<OnceLock<Box<Lights>>>,
     even: AtomicU64,
     smooth: AtomicU64,
     half_shadows: AtomicU64,
@@ -193,7 +193,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let glows: Vec<_> = glowing.iter().map(|&(node, light)| glow(solution, node, light)).collect();
         let tracer = PathTracer::with_glow(scene, &solution.scene.visibility, &glows);
         let nodes = if mode == Mode::Distributions { 0 } else { solution.elements.nodes.len() };
-        let nearby = std::iter::repeat_with(OnceLock::new).take(nodes).collect();
+        let lights = std::iter::repeat_with(OnceLock::new).take(nodes).collect();
         let glowing = glowing.iter().map(|&(node, _)| node).collect();
         Self {
             scene,
@@ -203,7 +203,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             followed: f32::INFINITY,
             tracer,
             glowing,
-            nearby,
+            lights,
             even: AtomicU64::new(0),
             smooth: AtomicU64::new(0),
             half_shadows: AtomicU64::new(0),
@@ -494,7 +494,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
 
     /// What is known of the emitters that light a leaf, found out where it is asked for.
     fn lights(&self, leaf: NodeId) -> Option<&Lights> {
-        let lights = self.nearby.get(leaf.index())?.get_or_init(|| {
+        let lights = self.lights.get(leaf.index())?.get_or_init(|| {
             let element = &self.solution.elements.nodes[leaf.index()];
             let place = Lit { surface: element.source, domain: element.domain, back: element.kind == Kind::Back };
             let visibility = &self.solution.scene.visibility;
@@ -773,7 +773,7 @@ mod tests {
         };
         let scene = Scene { surfaces, materials: vec![material(0.2, 0.0), material(0.0, 10.0)], ..Scene::default() };
         let [eye, target, up] = [[0.0, -0.9, 0.9], [0.0, 0.0, 0.0], [0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2]];
-        (scene.clone(), Camera { eye, target, up, fov_x: 50.0, width: 48, height: 32 })
+        (scene, Camera { eye, target, up, fov_x: 50.0, width: 48, height: 32 })
     }
 
     /// Where emitters are partly hidden all over a leaf, vertices know their light as well as rays of pixels do, and without noise.
@@ -788,7 +788,7 @@ mod tests {
         let solved = asked.expect("a sound scene").0;
         let caster = || RayCaster::new(&scene, &solved.solution, Mode::Samples);
         let (believing, mut asking) = (caster(), caster());
-        for (leaf, place) in asking.nearby.iter_mut().enumerate() {
+        for (leaf, place) in asking.lights.iter_mut().enumerate() {
             if solved.solution.elements.nodes[leaf].is_patch() {
                 let nearby = believing.lights(NodeId(leaf as u32)).map(|lights| lights.nearby.clone());
                 *place = OnceLock::from(Box::new(Lights { nearby: nearby.expect("of all nodes"), are_even: false }));

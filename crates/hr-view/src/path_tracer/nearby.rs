@@ -184,6 +184,9 @@ impl Nearby {
     /// channels) to points all over it: nothing so fine throws shadows on it that one would see.
     #[must_use]
     pub fn is_even_half_shadow(&self, brought: impl Iterator<Item = f32>) -> bool {
+        if self.half_shadow <= 0.0 {
+            return false;
+        }
         let (low, high) = brought.fold((f32::INFINITY, 0.0f32), |(low, high), light| (low.min(light), high.max(light)));
         high > 0.0 && high - low < UNEVEN * self.half_shadow && high < LIGHT * self.half_shadow
     }
