@@ -7,7 +7,7 @@ use crate::hierarchy::{Element, Kind};
 use crate::hooks::LightField;
 use crate::toward::Detail;
 use crate::transport::Light;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
 
 /// Places and senders whose radii together are below this share of their distance are far from each other.
@@ -37,37 +37,40 @@ impl Spots<'_> {
         reach * reach < FAR * FAR * sender.center.distance_squared(self.middle.0)
     }
 
-    /// By point, what arrives from a sender (sum of channels) that brings so much to the middle, where it may stand for all of the place.
-    pub(crate) fn by_middle(&self, sender: &Element, value: f32) -> Option<SmallVec<[f32; 8]>> {
+    /// By point, what arrives from a sender that brings so much to the middle, where it may stand for all of the place.
+    pub(crate) fn by_middle(&self, sender: &Element, brought: Vec2) -> Option<SmallVec<[Vec2; 8]>> {
         let kernel = |x: Vec3, n: Vec3| {
             let to = sender.center - x;
             to.dot(n).max(0.0) / (to.length_squared() * to.length()).max(f32::MIN_POSITIVE)
         };
-        let mut kernels: SmallVec<[f32; 8]> = self.points.iter().map(|&(x, n, _)| kernel(x, n)).collect();
+        let kernels: SmallVec<[f32; 8]> = self.points.iter().map(|&(x, n, _)| kernel(x, n)).collect();
         let mean: f32 = kernels.iter().zip(self.points).map(|(kernel, (.., weight))| kernel * weight).sum();
         let in_middle = kernel(self.middle.0, self.middle.1);
         // Where the middle hardly faces the sender it tells little of the rest.
-        (in_middle > FACES * mean).then(|| {
-            kernels.iter_mut().for_each(|kernel| *kernel *= value / in_middle);
-            kernels
-        })
+        (in_middle > FACES * mean).then(|| kernels.into_iter().map(|kernel| brought * (kernel / in_middle)).collect())
     }
 }
 
 impl<L: LightField> Light<'_, L> {
-    /// By point of a place, what arrives from a sender if it is wholly visible (sum of channels).
-    pub(crate) fn arriving_all_over(&self, spots: Spots<'_>, sender: u32) -> SmallVec<[f32; 8]> {
-        let mut arriving = SmallVec::from_elem(0.0, spots.points.len());
+    /// By point of a place, what arrives from a sender if it is wholly visible (sum of channels), and the share of the view that it takes up.
+    pub(crate) fn arriving_all_over(&self, spots: Spots<'_>, sender: u32) -> SmallVec<[Vec2; 8]> {
+        let mut arriving = SmallVec::from_elem(Vec2::ZERO, spots.points.len());
         self.add_all_over(spots, sender, &mut arriving);
         arriving
     }
 
-    fn add_all_over(&self, spots: Spots<'_>, sender: u32, arriving: &mut [f32]) {
+    /// The same at a single point.
+    pub(crate) fn brought_to(&self, x: Vec3, n: Vec3, sender: u32, negligible: f32) -> Vec2 {
+        let (light, share) = self.arriving_at(x, n, sender, Detail::carried(negligible));
+        Vec2::new(light.element_sum(), share)
+    }
+
+    fn add_all_over(&self, spots: Spots<'_>, sender: u32, arriving: &mut [Vec2]) {
         let element = self.element(sender);
         if self.emitted_most(sender) <= 0.0 {
             return;
         }
-        let at = |x: Vec3, n: Vec3| self.arriving_at(x, n, sender, Detail::carried(spots.negligible)).0.element_sum();
+        let at = |x: Vec3, n: Vec3| self.brought_to(x, n, sender, spots.negligible);
         if element.kind != Kind::Light && spots.is_far(element) {
             let (x, n) = spots.middle;
             if let Some(values) = spots.by_middle(element, at(x, n)) {
@@ -94,7 +97,7 @@ mod tests {
     fn what_arrives_all_over_arrives_at_each_point() {
         let solver = solve(&room(), 0.1, (), Skips::ALL);
         let light = solver.light();
-        let (mut far, mut off, mut all) = (0, 0.0, 0.0);
+        let (mut far, mut off, mut all) = (0, Vec2::ZERO, Vec2::ZERO);
         let to_patches = solver.links.all().iter().filter(|link| light.element(link.receiver).is_patch());
         for link in to_patches {
             let (receiver, sender) = (light.element(link.receiver), light.element(link.sender));
@@ -104,13 +107,13 @@ mod tests {
             far += u32::from(spots.is_far(sender));
             let at_once = light.arriving_all_over(spots, link.sender);
             for (at_once, &(x, n, weight)) in at_once.into_iter().zip(&points) {
-                let by_point = light.arriving_at(x, n, link.sender, Detail::carried(0.0)).0.element_sum();
+                let by_point = light.brought_to(x, n, link.sender, 0.0);
                 off += weight * receiver.area * (at_once - by_point).abs();
                 all += weight * receiver.area * by_point;
             }
         }
         assert!(far > 1000, "{far} senders are far");
-        assert!(off > 0.0 && off < 0.02 * all, "off by {} of the light", off / all);
+        assert!(off.cmpgt(Vec2::ZERO).all() && off.cmplt(0.02 * all).all(), "off by {} of light and view", off / all);
     }
 
     /// Where the middle does not face a sender that others see, each point looks for itself.
@@ -121,7 +124,10 @@ mod tests {
         let above = sender.center + Vec3::Z * 100.0;
         let points = Points::from_slice(&[(above, Vec3::NEG_Z, 0.5), (above, Vec3::Z, 0.5)]);
         let spots = |normal: Vec3| Spots { points: &points, middle: (above, normal), radius: 1.0, negligible: 0.0 };
-        assert_eq!(spots(Vec3::NEG_Z).by_middle(sender, 3.0).as_deref(), Some([3.0, 0.0].as_slice()));
-        assert_eq!(spots(Vec3::Z).by_middle(sender, 0.0), None);
+        assert_eq!(
+            spots(Vec3::NEG_Z).by_middle(sender, Vec2::splat(3.0)).as_deref(),
+            Some([Vec2::splat(3.0), Vec2::ZERO].as_slice())
+        );
+        assert_eq!(spots(Vec3::Z).by_middle(sender, Vec2::ZERO), None);
     }
 }

@@ -27,9 +27,9 @@ const BETWEEN_WATCHES: usize = 32;
 const ABOVE: f32 = 1e-3;
 /// What all senders together bring counts as much as this share of what a single one does: a shadow in which there is nothing left is seen
 /// however small it is.
-const SHARE: f32 = 0.6;
+const SHARE: f32 = 0.5;
 /// What differs by less than this share from one point to another is shown by interpolation as well.
-const SOFT: f32 = 0.6;
+const SOFT: f32 = 0.4;
 
 /// Splits leaves within which openness differs by what counts, and their parts likewise. `watch` is told how many elements there are; once
 /// it breaks, no more are split. Returns the rays that were shot.

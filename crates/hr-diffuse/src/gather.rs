@@ -105,13 +105,38 @@ impl Gather {
         let push = Push::new(light, links, error, (room, known), watch);
         let emitted = light.emitted_power();
         let groups = by_link(links, &push.spreads, |link, spread| Group::of_link(light, &emitted, link, spread));
-        // The rows of form factors are what would arrive of unit radiosity.
+        let mut gather = Self { groups, push, ..Self::default() };
+        gather.balance(light, links, error.is_some());
+        gather
+    }
+
+    /// Finds weights anew where light comes from other parts of senders than when they were found: by node, so much of it is `uneven`.
+    /// Returns the number of places, and of rays.
+    pub(crate) fn renew<L: LightField>(
+        &mut self,
+        light: Light<'_, L>,
+        links: &Links,
+        uneven: &[f32],
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> (u64, u64) {
+        let before = self.push.rays;
+        let renewed = self.push.renew(light, links, (uneven, &self.directional), watch);
+        if renewed > 0 {
+            self.balance(light, links, true);
+        }
+        (renewed, self.push.rays - before)
+    }
+
+    /// Makes the rows of form factors, which are what would arrive of unit radiosity, sum to what they should; with a `look` whether that
+    /// is all there is to see.
+    fn balance<L: LightField>(&mut self, light: Light<'_, L>, links: &Links, look: bool) {
+        let Self { push, groups, .. } = &*self;
         let each = by_link(links, &push.spreads, |link, spread| share(light, link, spread));
-        let shares =
-            push.sums(light, links, (&groups, &each)).into_iter().map(|[_, shares @ ..]| shares.map(|s| s.max(0.0)));
+        let sums = push.sums(light, links, (groups, &each)).into_iter();
+        let shares = sums.map(|[_, shares @ ..]| shares.map(|share| share.max(0.0)));
         let shares: Vec<[f32; GROUPS - 1]> = shares.collect();
-        let rows = balance(light, &push.places.nodes, &shares, error.is_some());
-        let slopes = push.slopes(light, links, (&groups, &each), &rows);
+        let rows = balance(light, &push.places.nodes, (&shares, &push.dim_views), look);
+        let slopes = push.slopes(light, links, (groups, &each), &rows);
         let tilt = |(slope, index): ([f32; 3], usize)| {
             let [emitters, rest @ ..]: [f32; GROUPS - 1] =
                 std::array::from_fn(|i| shares[index][i] * rows[index][i + 1]);
@@ -120,11 +145,10 @@ impl Gather {
             if closed { Vec3::from(slope) / rest } else { Vec3::ZERO }
         };
         let tilts = slopes.into_iter().zip(push.places.joined()).map(tilt).collect();
-        let mut gather = Self { groups, push, rows, tilts, ..Self::default() };
+        (self.rows, self.tilts) = (rows, tilts);
         if light.element(0).active {
-            gather.lit = gather.lit_areas(light, links);
+            self.lit = self.lit_areas(light, links);
         }
-        gather
     }
 
     /// Compares what arrives of reflected light with what rays find, so many for each place that reflects any light, and makes it so;
@@ -259,7 +283,7 @@ impl Gather {
     }
 
     /// See [`Push::looked_at`].
-    pub(crate) fn looked_at(&self, elements: &Elements, place: u32) -> Vec<(usize, Weight)> {
+    pub(crate) fn looked_at(&self, elements: &Elements, place: u32) -> (Vec<(usize, Weight)>, Option<f32>) {
         self.push.looked_at(elements, place)
     }
 

@@ -432,7 +432,7 @@ impl Vertices {
 
 impl Stats {
     /// All counters, in the order in which they are kept.
-    fn counters(&mut self) -> [&mut u64; 24] {
+    fn counters(&mut self) -> [&mut u64; 25] {
         let Self {
             polygons,
             nodes,
@@ -443,6 +443,7 @@ impl Stats {
             vertex_rays,
             pairs,
             renewed_links,
+            renewed_places,
             kept_links,
             iterations: _,
             links_evaluated,
@@ -482,6 +483,7 @@ impl Stats {
             vertex_rays,
             pairs,
             renewed_links,
+            renewed_places,
             kept_links,
             links_evaluated,
             bytes,
@@ -516,7 +518,7 @@ impl Stats {
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
         let mut stats = Self::default();
-        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 24>(WHAT)?) {
+        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 25>(WHAT)?) {
             *counter = kept;
         }
         let [iterations, stopped, spent] = from.take_exactly::<u64, 3>(WHAT)?;

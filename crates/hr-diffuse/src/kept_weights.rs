@@ -4,8 +4,9 @@
 
 use crate::Rgb;
 use crate::gather::Gather;
-use crate::hierarchy::{Elements, Kind};
+use crate::hierarchy::Elements;
 use crate::hooks::LightField;
+use crate::light_then::LightThen;
 use crate::links::{Link, Links};
 use crate::moved::Moved;
 use crate::push::{Spread, Weight, visible};
@@ -29,8 +30,8 @@ pub(crate) struct KeptWeights {
     /// By link: whether what has moved does not concern it at all.
     stays: Vec<bool>,
     moved: Moved,
-    /// By node: radiosity and directional light (sums of channels) when the weights were found.
-    light: Vec<[f32; 2]>,
+    /// When the weights were found.
+    light: LightThen,
     /// By node: the share of its light that is distributed otherwise than it was then.
     uneven: Vec<f32>,
     /// Whether leaves need not look for themselves at other links either: not before most of the light is there.
@@ -40,35 +41,19 @@ pub(crate) struct KeptWeights {
 impl KeptWeights {
     /// Those of links of which some stay.
     pub(crate) fn new(gather: Gather, links: Links, stays: Vec<bool>, moved: Moved, exitant: &Exitant) -> Self {
-        Self { gather, links, stays, moved, light: light(exitant), uneven: Vec::new(), rough: false }
+        Self { gather, links, stays, moved, light: LightThen::new(exitant), uneven: Vec::new(), rough: false }
     }
 
-    /// Finds which senders' light is distributed among their parts otherwise than it was. Where directional light goes is not known;
-    /// as long as it is as much, it is taken to come from where it came from, and to go where it went.
+    /// Finds which senders' light is distributed among their parts otherwise than it was.
     pub(crate) fn with_light(mut self, elements: &Elements, exitant: &Exitant) -> Self {
-        let now = light(exitant);
-        // Parts that are new had the light of what they are parts of.
-        for node in self.light.len()..now.len() {
-            self.light.push(self.light[elements.nodes[node].parent as usize]);
-        }
-        let redirected = |(before, now): (&[f32; 2], &[f32; 2])| {
-            let changed = (now[1] - before[1]).abs();
-            if changed > 0.0 { changed / (now[0] + now[1]) } else { 0.0 }
-        };
-        let redirected = self.light.iter().zip(&now).map(redirected);
-        self.uneven =
-            redistributed(elements, &self.light, &now).into_iter().zip(redirected).map(|(a, b)| a + b).collect();
+        self.uneven = self.light.uneven(elements, exitant);
         self
     }
 
     /// Links that are as fine as they were made to be, and others: those of senders that are much brighter than they were.
     pub(crate) fn as_fine_as_ever(&self, links: Vec<Link>, exitant: &Exitant) -> (Vec<Link>, Vec<Link>) {
-        let sum = |[diffuse, directional]: [f32; 2]| diffuse + directional;
-        let now = light(exitant);
-        let is_fine = |link: &Link| {
-            let before = self.light.get(link.sender as usize).copied().map_or(0.0, sum);
-            sum(now[link.sender as usize]) <= RISEN * before
-        };
+        let now = LightThen::new(exitant);
+        let is_fine = |link: &Link| now.of(link.sender as usize) <= RISEN * self.light.of(link.sender as usize);
         links.into_iter().partition(is_fine)
     }
 
@@ -111,7 +96,8 @@ impl KeptWeights {
 
     /// Weights of a place, in the order of the nodes from the place up to the root, then of senders.
     pub(crate) fn of(&self, elements: &Elements, place: u32) -> PlaceWeights<'_> {
-        PlaceWeights { kept: self, place, left: self.gather.looked_at(elements, place).into_iter().peekable() }
+        let (left, dim_view) = self.gather.looked_at(elements, place);
+        PlaceWeights { kept: self, place, dim_view, left: left.into_iter().peekable() }
     }
 }
 
@@ -119,6 +105,8 @@ impl KeptWeights {
 pub(crate) struct PlaceWeights<'a> {
     kept: &'a KeptWeights,
     place: u32,
+    /// As in [`Push`](crate::push::Push); of a place that is not known, nothing.
+    pub(crate) dim_view: Option<f32>,
     left: Peekable<IntoIter<(usize, Weight)>>,
 }
 
@@ -144,32 +132,4 @@ impl PlaceWeights<'_> {
             && (stays[at] || !moved.concerns(light.scene, light.elements, pair));
         stays.then_some(weight)
     }
-}
-
-/// By node: radiosity and directional light (sums of channels).
-fn light(exitant: &Exitant) -> Vec<[f32; 2]> {
-    exitant.radiosity.iter().zip(&exitant.directional).map(|it| [it.0.element_sum(), it.1.element_sum()]).collect()
-}
-
-/// By node: by which share of its power the light of its parts is distributed otherwise than it was.
-fn redistributed(elements: &Elements, before: &[[f32; 2]], now: &[[f32; 2]]) -> Vec<f32> {
-    let light =
-        |all: &[[f32; 2]], node: usize| all.get(node).map_or(0.0, |[diffuse, directional]| diffuse + directional);
-    let mut changed = vec![0.0; elements.nodes.len()];
-    for (node, element) in elements.nodes.iter().enumerate().rev() {
-        let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
-        let scale = light(now, node) / light(before, node);
-        let (mut sum, mut power) = (0.0, 0.0);
-        for child in children.filter(|&child| elements.nodes[child].kind != Kind::Light) {
-            let own = light(now, child) * elements.nodes[child].area;
-            // What there would be if it had changed as the whole has.
-            let even = light(before, child) * scale * elements.nodes[child].area;
-            sum += own * changed[child] + (own - even).abs();
-            power += own;
-        }
-        if power > 0.0 {
-            changed[node] = if sum.is_finite() { sum / power } else { f32::INFINITY };
-        }
-    }
-    changed
 }

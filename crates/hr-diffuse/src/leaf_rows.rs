@@ -67,13 +67,14 @@ const CLOSED_RAYS: u32 = 32;
 /// … and so many for each place.
 const CLOSED_RAYS_PER_PLACE: u32 = 4;
 
-/// By place, the factors for the light of each group that balance its row, by the shares of all but the first; for nothing but the
+/// By place, the factors for the light of each group that balance its row, by the shares of all but the first, and what dark parts of
+/// senders take up beyond them; for nothing but the
 /// limits where nobody is to `look`. Rows are 1 where all that is seen from a side of a surface sends light: as many rays as
 /// are shot miss an opening only if it hardly counts.
 pub(crate) fn balance<L: LightField>(
     light: Light<'_, L>,
     places: &[u32],
-    shares: &[[f32; GROUPS - 1]],
+    (shares, dim_views): (&[[f32; GROUPS - 1]], &[f32]),
     look: bool,
 ) -> Vec<[f32; GROUPS]> {
     let side = |index: u32| {
@@ -101,7 +102,7 @@ pub(crate) fn balance<L: LightField>(
         let factors = |&index: &u32| {
             let row = row(index);
             row.factors(match row.exposed >= 1.0 {
-                true if closed => 1.0,
+                true if closed => 1.0 - dim_views.get(index as usize).map_or(0.0, |dim| dim.min(1.0)),
                 true => (most * row.sum()).min(MOST_SEEN),
                 false => row.sum().min(row.exposed),
             })

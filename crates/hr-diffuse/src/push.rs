@@ -6,9 +6,8 @@
 //! next to nothing are spread evenly over flat nodes, and by orientation and distance alone over others: see
 //! [`inherited`](crate::inherited).
 
-use crate::NodeId;
 use crate::all_over::{Points, Spots};
-use crate::gather::{GROUPS, Group};
+use crate::gather::{GROUPS, Group, share};
 use crate::hierarchy::{Element, Elements, GRAFT, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
 use crate::inherited::{Above, Carried, inherit};
@@ -18,9 +17,9 @@ use crate::places::{Edges, Places};
 use crate::sampling::hash;
 use crate::segments::{receiving_point, visibility};
 use crate::threads;
-use crate::toward::Detail;
 use crate::transport::{Light, negligible};
 use crate::visibility::Proof;
+use crate::{NodeId, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
 use std::ops::{ControlFlow, Mul};
@@ -36,6 +35,14 @@ const OWN_SHARE: f32 = 0.02;
 /// Links that bring a leaf more than this share of its light from near by, times the square root of the tolerance, are looked at from
 /// several points of it.
 const MUCH_SHARE: f32 = 0.045;
+/// Weights are found anew at places where near senders bring less by more than this share of all light than weights tell; …
+const STALE_SHARE: f32 = 0.3;
+/// … those of them that may bring less by more than this share of that are asked.
+const MISSING_SHARE: f32 = 0.25;
+/// Dark parts of senders that take up no more than this share of a place's view beyond what its weights tell are not told from noise.
+const LEAST_DIM_VIEW: f32 = 0.1;
+/// Where more than this share of what a sender sends is an extension's, what was found stays: its parts have no lobes of their own.
+const DIRECTIONAL_SHARE: f32 = 0.1;
 /// Points of a place lie across a line if they do by this share of their spread (of squares).
 const LEAST_SPREAD: f32 = 0.01;
 /// Irradiance × importance × √(share of all area) that a place of many leaves may be off its mean by for the edge of a shadow, as a
@@ -62,7 +69,7 @@ const MAY_BE_VISIBLE: f32 = 0.1;
 /// Bytes that are kept for each link, …
 pub(crate) const LINK_BYTES: usize = size_of::<Spread>() + size_of::<f32>();
 /// … and for each leaf, beside its weights.
-pub(crate) const LEAF_BYTES: usize = size_of::<u32>() + size_of::<usize>();
+pub(crate) const LEAF_BYTES: usize = size_of::<u32>() + size_of::<usize>() + size_of::<f32>();
 /// Places whose weights a thread finds between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 32;
 
@@ -91,6 +98,9 @@ pub(crate) struct Push {
     pub(crate) faint_links: u64,
     /// Rays shot for places and weights.
     pub(crate) rays: u64,
+    /// By place that has weights: how much more of its view is taken up than links and weights tell. Of the dark part of a bright sender,
+    /// which is all that a place sees next to where both meet, they tell little; yet it hides the rest.
+    pub(crate) dim_views: Vec<f32>,
     /// Where the weights of each place begin; as many places as have kept ones, and the end of the last.
     first: Vec<usize>,
     /// By place, then by node from there up to the root, then by those links of the node that have weights.
@@ -122,6 +132,7 @@ impl Push {
             means,
             faint_links: 0,
             rays: 0,
+            dim_views: Vec::new(),
             first: vec![0],
             weights: Vec::new(),
             weighted: Vec::new(),
@@ -151,43 +162,116 @@ impl Push {
             push.first.push(end);
         }
         let mut weights = vec![0.0; push.first[push.first.len() - 1]];
-        let mut parts: Vec<(u32, &mut [f32])> = Vec::with_capacity(push.first.len());
-        let mut rest = weights.as_mut_slice();
-        for (range, &place) in push.first.windows(2).zip(&push.places.nodes) {
-            let (part, after) = rest.split_at_mut(range[1] - range[0]);
-            parts.push((place, part));
-            rest = after;
-        }
+        let mut parts = by_place(&mut weights, &push.first, &push.places.nodes);
         let chunk = if error.is_some() { BETWEEN_WATCHES * threads::current_num_threads() } else { parts.len().max(1) };
-        let (mut rays, rough) = (found_by, error.is_none() || known.is_some_and(|known| known.rough));
+        let mut rays = found_by;
+        let look = match known {
+            Some(known) => Look::Beyond(known),
+            None if error.is_none() => Look::Roughly,
+            None => Look::Closely,
+        };
         for part in parts.chunks_mut(chunk) {
             if error.is_some() && watch().is_break() {
                 return Self::new(light, links, None, (room, None), watch);
             }
-            let shot = threads::map_mut(part, 4, |_, (node, weights)| {
-                let (mut slots, mut rays) = (weights.chunks_exact_mut(numbers(light, *node)), 0);
-                let mut known = known.map(|known| known.of(light.elements, *node));
-                push.each(light, *node, |place, at| {
-                    if let Some(slot) = slots.next() {
-                        let link = &links.all()[at];
-                        let find = || match rough {
-                            true => (place.plain(light, link), 0),
-                            false => place.weight(light, link, push.means[at], rays),
-                        };
-                        let brings = push.means[at] * visible(link, Spread::Exact);
-                        let known = known.as_mut().and_then(|known| known.take(light, link, (brings, place.uneven)));
-                        let (weight, shot) = known.map_or_else(find, |weight| (weight, 0));
-                        weight.keep(slot);
-                        rays += shot;
-                    }
-                });
-                u64::from(rays)
-            });
-            rays += shot.into_iter().sum::<u64>();
+            for (dim_view, shot) in threads::map_mut(part, 4, |_, part| push.find(light, links, part, look)) {
+                push.dim_views.push(dim_view);
+                rays += u64::from(shot);
+            }
         }
         push.rays = rays;
         push.weights = weights;
         push
+    }
+
+    /// Finds the weights of a place. Returns how much more of its view is taken up than they tell, and the number of rays that it took.
+    fn find<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        links: &Links,
+        (node, weights): &mut (u32, &mut [f32]),
+        look: Look<'_>,
+    ) -> (f32, u32) {
+        let (mut slots, mut rays) = (weights.chunks_exact_mut(numbers(light, *node)), 0);
+        let mut known = if let Look::Beyond(known) = look { Some(known.of(light.elements, *node)) } else { None };
+        let before = known.as_ref().and_then(|known| known.dim_view);
+        let mut dim_view = 0.0;
+        self.each(light, *node, |place, at| {
+            let Some(slot) = slots.next() else { return };
+            let link = &links.all()[at];
+            let plain = || Found { weight: place.plain(light, link), ..Found::default() };
+            let find = || match look {
+                Look::Roughly => plain(),
+                Look::Beyond(known) if known.rough => plain(),
+                _ => place.weight(light, link, self.means[at], rays),
+            };
+            let brings = self.means[at] * visible(link, Spread::Exact);
+            let known = known.as_mut().and_then(|known| known.take(light, link, (brings, place.uneven)));
+            let mut found = known.map_or_else(find, |weight| Found { weight, ..Found::default() });
+            if matches!(look, Look::Again) && is_directional(light, link.sender) {
+                found.weight = Weight::of(slot);
+            }
+            found.weight.keep(slot);
+            rays += found.rays;
+            if let Some(view) = found.view.filter(|_| Group::of(light, link.sender) == Group::Rest) {
+                dim_view += view - found.weight.value * share(light, link, Spread::Exact);
+            }
+        });
+        (before.unwrap_or(if dim_view > LEAST_DIM_VIEW { dim_view } else { 0.0 }), rays)
+    }
+
+    /// Finds the weights of those places anew to which light comes from other parts of their senders than when they were found: by node,
+    /// a share of the light that is `uneven`, by link, what senders send of an extension's light. Returns the number of places; what is left
+    /// when `watch` breaks stays as it is.
+    pub(crate) fn renew<L: LightField>(
+        &mut self,
+        light: Light<'_, L>,
+        links: &Links,
+        (uneven, directional): (&[f32], &[Rgb]),
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> u64 {
+        threads::map_mut(&mut self.means, 256, |at, mean| {
+            let link = &links.all()[at];
+            let directional = directional.get(at).copied().unwrap_or_default();
+            *mean = light.emitted_with(link, directional).element_sum() * link.factor;
+        });
+        let is_stale = |index: usize| {
+            let node = self.places.nodes[index];
+            let place = Place::new(light, node, self.places.middle(light.elements, node), self.error);
+            let irradiance = light.exitant.irradiance[node as usize].element_sum();
+            let mut missing = 0.0;
+            self.each_weight(light, links, index, |at, weight| {
+                let (link, most) = (&links.all()[at], weight.value * self.means[at]);
+                let passes = visible(link, Spread::Exact);
+                let may_matter =
+                    most * passes * uneven[link.sender as usize] > MISSING_SHARE * STALE_SHARE * irradiance;
+                let is_near = || !place.spots(light).is_far(light.element(link.sender));
+                if may_matter && is_near() && !is_directional(light, link.sender) {
+                    missing += passes * (most - place.varying(light, link).0.value).max(0.0);
+                }
+            });
+            missing > STALE_SHARE * irradiance
+        };
+        let stale: Vec<bool> = threads::map_range(0..self.first.len() - 1, 16, is_stale);
+        let mut weights = std::mem::take(&mut self.weights);
+        let mut parts = by_place(&mut weights, &self.first, &self.places.nodes);
+        let mut parts: Vec<(usize, &mut (u32, &mut [f32]))> =
+            parts.iter_mut().enumerate().filter(|(index, _)| stale[*index]).collect();
+        let (mut renewed, mut rays, mut dim_views) = (0, 0, std::mem::take(&mut self.dim_views));
+        for part in parts.chunks_mut(BETWEEN_WATCHES * threads::current_num_threads()) {
+            if watch().is_break() {
+                break;
+            }
+            let found = threads::map_mut(part, 4, |_, (_, part)| self.find(light, links, part, Look::Again));
+            for ((index, _), (dim_view, shot)) in part.iter().zip(found) {
+                dim_views[*index] = dim_view;
+                rays += u64::from(shot);
+                renewed += 1;
+            }
+        }
+        (self.weights, self.dim_views) = (weights, dim_views);
+        self.rays += rays;
+        renewed
     }
 
     /// Places have the ids that they have after [`Elements::graft`].
@@ -200,15 +284,16 @@ impl Push {
         }
     }
 
-    /// Weights of a place for links that were looked at closely, by their position among `links`: from the place up to the root.
-    pub(crate) fn looked_at(&self, elements: &Elements, place: u32) -> Vec<(usize, Weight)> {
+    /// Weights of a place for links that were looked at closely, by their position among `links`, from the place up to the root; and how
+    /// much its view is dimmer than they tell.
+    pub(crate) fn looked_at(&self, elements: &Elements, place: u32) -> (Vec<(usize, Weight)>, Option<f32>) {
         let index = self.places.nodes.binary_search(&place).ok();
-        let Some(range) = index.and_then(|index| self.first.get(index..index + 2)) else { return Vec::new() };
+        let Some(range) = index.and_then(|index| self.first.get(index..index + 2)) else { return (Vec::new(), None) };
         let numbers = if elements.nodes[place as usize].is_patch() { 1 } else { Weight::NUMBERS };
         let mut weights = self.weights[range[0]..range[1]].chunks_exact(numbers);
         let mut found = Vec::with_capacity(weights.len());
         self.weighted_above(elements, place, |at| found.extend(weights.next().map(|weight| (at, Weight::of(weight)))));
-        found
+        (found, index.and_then(|index| self.dim_views.get(index).copied()))
     }
 
     /// The weight of a place for one link above it, by its receiver and position among all links, if the place has looked closely at it.
@@ -313,6 +398,23 @@ impl Push {
     }
 }
 
+/// Whether what a sender sends is an extension's light, by more than next to nothing.
+fn is_directional<L: LightField>(light: Light<'_, L>, sender: u32) -> bool {
+    let directional = light.exitant.directional[sender as usize].element_sum();
+    directional > DIRECTIONAL_SHARE * (directional + light.exitant.radiosity[sender as usize].element_sum())
+}
+
+/// The weights of each place that has any, by where they begin.
+fn by_place<'a>(mut weights: &'a mut [f32], first: &[usize], places: &[u32]) -> Vec<(u32, &'a mut [f32])> {
+    let mut parts = Vec::with_capacity(first.len());
+    for (range, &place) in first.windows(2).zip(places) {
+        let (part, after) = weights.split_at_mut(range[1] - range[0]);
+        parts.push((place, part));
+        weights = after;
+    }
+    parts
+}
+
 /// Whether what a node received means different things to its leaves, or to parts of it: not where a link's factor is the mean
 /// over the leaf itself.
 pub(crate) fn is_shared<L: LightField>(light: Light<'_, L>, node: u32) -> bool {
@@ -408,6 +510,28 @@ impl Mul<f32> for Weight {
     }
 }
 
+/// How a place looks at its links.
+#[derive(Clone, Copy)]
+enum Look<'a> {
+    /// By orientation and distance alone.
+    Roughly,
+    Closely,
+    /// At those that are not known.
+    Beyond(&'a KeptWeights),
+    /// Once more.
+    Again,
+}
+
+/// What a place finds out about a link.
+#[derive(Default)]
+struct Found {
+    weight: Weight,
+    /// The share of the view that what is seen of the sender takes up, if the place asked.
+    view: Option<f32>,
+    /// Rays that were shot.
+    rays: u32,
+}
+
 /// A place, and the points that stand for it.
 struct Place {
     node: u32,
@@ -461,31 +585,33 @@ impl Place {
         Spots { points: &self.points, middle: (x, n), radius, negligible: self.negligible }
     }
 
-    /// What a link brings that is wholly visible, where it varies over the place.
-    fn varying<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
-        let arriving = light.arriving_all_over(self.spots(light), link.sender);
-        if light.element(self.node).is_patch() {
-            let value = self.points.iter().zip(arriving).map(|((.., weight), arriving)| weight * arriving).sum();
-            return Weight { value, ..Weight::default() };
-        }
-        self.fitted(light, &arriving)
+    /// What a link brings that is wholly visible, where it varies over the place, and the share of the view that its sender takes up.
+    fn varying<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> (Weight, f32) {
+        self.all_over(light, &light.arriving_all_over(self.spots(light), link.sender))
     }
 
     /// The same of a sender that is far, by what arrives in the middle.
-    fn by_middle<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
+    fn by_middle<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> (Weight, f32) {
         let (x, n, _) = self.middle;
-        let value = light.arriving_at(x, n, link.sender, Detail::carried(self.negligible)).0.element_sum();
+        let brought = light.brought_to(x, n, link.sender, self.negligible);
         if light.element(self.node).is_patch() || light.elements.is_distant(NodeId(link.sender)) {
-            return Weight { value, ..Weight::default() };
+            return (Weight { value: brought.x, ..Weight::default() }, brought.y);
         }
-        let by_middle = self.spots(light).by_middle(light.element(link.sender), value);
-        by_middle.map_or_else(|| self.varying(light, link), |arriving| self.fitted(light, &arriving))
+        let by_middle = self.spots(light).by_middle(light.element(link.sender), brought);
+        by_middle.map_or_else(|| self.varying(light, link), |arriving| self.all_over(light, &arriving))
+    }
+
+    /// The same by what arrives at each of its points.
+    fn all_over<L: LightField>(&self, light: Light<'_, L>, arriving: &[Vec2]) -> (Weight, f32) {
+        let mean: Vec2 = self.points.iter().zip(arriving).map(|((.., weight), &arriving)| *weight * arriving).sum();
+        let whole = Weight { value: mean.x, ..Weight::default() };
+        (if light.element(self.node).is_patch() { whole } else { self.fitted(light, arriving) }, mean.y)
     }
 
     /// The plane over a place of many leaves that fits best what is there at its points.
-    fn fitted<L: LightField>(&self, light: Light<'_, L>, arriving: &[f32]) -> Weight {
+    fn fitted<L: LightField>(&self, light: Light<'_, L>, arriving: &[Vec2]) -> Weight {
         let values: SmallVec<[f32; 8]> =
-            self.points.iter().zip(arriving).map(|((.., weight), arriving)| weight * arriving).collect();
+            self.points.iter().zip(arriving).map(|((.., weight), arriving)| weight * arriving.x).collect();
         let value: f32 = values.iter().sum();
         let element = light.element(self.node);
         // Of (s, t) from the mean of the points, by the normal equations.
@@ -518,9 +644,9 @@ impl Place {
         element.mean_cosine(direction) * scale
     }
 
-    /// The same as asked for, and the number of rays shot after so many `before`; `mean` is what the link would bring to its receiver
-    /// if it were wholly visible.
-    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32, before: u32) -> (Weight, u32) {
+    /// The same as asked for, after so many rays shot `before`; `mean` is what the link would bring to its receiver if it were wholly
+    /// visible.
+    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32, before: u32) -> Found {
         let element = light.element(self.node);
         let flat = element.is_flat();
         let visible = visible(link, Spread::Exact);
@@ -528,32 +654,34 @@ impl Place {
         let sender = light.element(link.sender);
         let far = self.spots(light).is_far(sender);
         if far && mean * visible * self.turned(light, link) < self.faint {
-            return (Weight { unseen: link.visibility >= 0.0, ..self.plain(light, link) }, 0);
+            let weight = Weight { unseen: link.visibility >= 0.0, ..self.plain(light, link) };
+            return Found { weight, ..Found::default() };
         }
         let shared = is_shared(light, link.receiver);
-        let here = if !shared {
-            Weight { value: mean, ..Weight::default() }
+        let (here, view) = if !shared {
+            (Weight { value: mean, ..Weight::default() }, None)
         } else if !far && (!element.is_patch() || mean * visible > self.much) {
-            self.varying(light, link)
+            let (here, view) = self.varying(light, link);
+            (here, Some(view))
         } else if flat || !element.is_patch() {
-            self.by_middle(light, link)
+            let (here, view) = self.by_middle(light, link);
+            (here, Some(view))
         } else {
             let direction = light.direction_to(element.center, link.sender);
-            let (irradiance, _) =
-                light.arriving_at(element.center, direction, link.sender, Detail::carried(self.negligible));
-            let value = irradiance.element_sum() * element.mean_cosine(direction);
-            Weight { value, ..Weight::default() }
+            let cosine = element.mean_cosine(direction);
+            let brought = cosine * light.brought_to(element.center, direction, link.sender, self.negligible);
+            (Weight { value: brought.x, ..Weight::default() }, Some(brought.y))
         };
         if here.value <= 0.0 {
-            return (Weight::default(), 0);
+            return Found::default();
         }
         let weight = here * ((here.value / mean).min(MOST_WEIGHT) / here.value);
         if link.visibility < 0.0 {
-            return (weight, 0);
+            return Found { weight, view: view.map(|view| view * visible), rays: 0 };
         }
         let worth = if shared { visible } else { visible.max(MAY_BE_VISIBLE) };
         let (seen, rays) = self.seen(light, link, here.value * worth, before);
-        (weight * (seen / visible), rays)
+        Found { weight: weight * (seen / visible), view: view.map(|view| view * seen), rays }
     }
 
     /// Share of a link's sender that the place sees, by as many rays as what it `brings` is worth, and their number. The rays of all

@@ -14,6 +14,7 @@ use crate::geometry::{Geometry, Normalization};
 use crate::hierarchy::{Elements, Kind, SceneData};
 use crate::hooks::LightField;
 use crate::kept_weights::KeptWeights;
+use crate::light_then::LightThen;
 use crate::links::Links;
 use crate::misjudged::Misjudged;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
@@ -177,6 +178,7 @@ pub struct Solver<L: LightField = ()> {
     edges_known: bool,
     /// What of it stays known for the next links.
     pub(crate) kept_weights: Option<KeptWeights>,
+    weighed_by: LightThen,
     /// What has links.
     pub(crate) linked: Linked,
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
@@ -271,6 +273,7 @@ impl<L: LightField> Solver<L> {
             prepared: false,
             edges_known: false,
             kept_weights: None,
+            weighed_by: LightThen::default(),
             linked: Linked::default(),
             faint,
             strong,
@@ -320,7 +323,7 @@ impl<L: LightField> Solver<L> {
             self.settle(pass, &mut stopped, watch);
             self.follow(pass, &mut stopped, watch);
             if pass.closely && !stopped {
-                self.calibrate(pass, &mut stopped, watch);
+                self.amend(pass, &mut stopped, watch);
             }
             let found = if pass.closely && !stopped { self.check(pass, &mut stopped, watch) } else { None };
             self.measure();
@@ -425,7 +428,7 @@ impl<L: LightField> Solver<L> {
         self.expect_in_proportion(pass, stopped, watch);
         self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, Reflect::Reshaped), stopped, watch);
         if !prepared {
-            self.calibrate(pass, stopped, watch);
+            self.amend(pass, stopped, watch);
         }
     }
 
@@ -541,11 +544,54 @@ impl<L: LightField> Solver<L> {
         });
     }
 
-    /// Compares what links bring of reflected light with what rays find, and lets light settle once more.
-    fn calibrate(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+    /// Compares what links bring with what there is, now that light is in place, and lets it settle once more: first where it
+    /// comes from, then how much of it there is.
+    fn amend(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
+        let renewed = self.renew_weights(pass, stopped, watch);
+        let calibrated = self.calibrate(pass, stopped, watch);
+        if renewed || calibrated {
+            self.convergence.restart();
+            self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, Reflect::Reshaped), stopped, watch);
+        }
+    }
+
+    /// Finds weights anew where light comes from other parts of senders than when they were found: next to where surfaces meet, these
+    /// are dark by now. Tells whether there are any.
+    fn renew_weights(
+        &mut self,
+        pass: Pass,
+        stopped: &mut bool,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> bool {
+        // Coarse links need no more.
+        if *stopped || self.stats.spent.is_some() {
+            return false;
+        }
+        let (start, account) = (Instant::now(), self.account);
+        let uneven = self.weighed_by.uneven(&self.elements, &self.exitant);
+        let progress = self.progress(Phase::Transport, pass.fraction(0.9));
+        let mut gather = std::mem::take(&mut self.gather);
+        let (renewed, rays) = gather.renew(self.light(), &self.links, &uneven, &mut || {
+            *stopped = *stopped || watch(&progress).is_break();
+            if *stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        self.gather = gather;
+        self.stats.rays += rays;
+        self.stats.renewed_places += renewed;
+        self.stats.seconds.transport += start.elapsed().as_secs_f64();
+        renewed > 0
+    }
+
+    /// Compares what links bring of reflected light with what rays find. Tells whether it has.
+    fn calibrate(
+        &mut self,
+        pass: Pass,
+        stopped: &mut bool,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> bool {
         // Where all links are proved free nothing is missing.
         if self.stats.rays == 0 || *stopped || self.account.is_over() {
-            return;
+            return false;
         }
         let (start, account) = (Instant::now(), self.account);
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
@@ -557,11 +603,7 @@ impl<L: LightField> Solver<L> {
         self.gather = gather;
         self.stats.check_rays += shot;
         self.stats.seconds.check += start.elapsed().as_secs_f64();
-        if shot == 0 {
-            return;
-        }
-        self.convergence.restart();
-        self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, Reflect::Reshaped), stopped, watch);
+        shot > 0
     }
 
     /// Finds what the solution is off by.
@@ -770,6 +812,7 @@ impl<L: LightField> Solver<L> {
         let known = known.map(|known| known.with_light(&self.elements, &self.exitant));
         self.gather = Gather::new(self.light(), &self.links, error, (room, known.as_ref()), watch);
         self.kept_weights = known.and_then(KeptWeights::once_more);
+        self.weighed_by = LightThen::new(&self.exitant);
         self.prepared = tolerance.is_some();
         self.stats.rays += self.gather.rays();
         self.stats.skipped.faint_links = self.gather.faint_links();

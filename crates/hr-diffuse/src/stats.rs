@@ -24,6 +24,8 @@ pub struct Stats {
     pub pairs: u64,
     /// Of the last edit of places: links that it concerned, which were made anew, …
     pub renewed_links: u64,
+    /// Places that found out anew how light reaches them, as it comes from other parts of senders than it did.
+    pub renewed_places: u64,
     /// … and those that stayed.
     pub kept_links: u64,
     /// Iterations (gather, push, reflect, pull).

@@ -6,6 +6,7 @@ mod adaptation;
 mod analytic;
 mod balance;
 mod budget;
+mod contact_shadows;
 mod contacts;
 mod copies;
 mod covered;

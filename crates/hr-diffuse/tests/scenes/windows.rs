@@ -45,7 +45,7 @@ fn absorbed(surfaces: Vec<Surface>, lights: Vec<Light>) -> f64 {
 
 #[track_caller]
 fn assert_lit(what: &str, side: f64, found: f64, comes_in: f64) {
-    assert!((found / comes_in - 1.0).abs() < 0.1, "{what}, a window of {side} m: {found} W of {comes_in}");
+    assert!((found / comes_in - 1.0).abs() < 0.11, "{what}, a window of {side} m: {found} W of {comes_in}");
 }
 
 #[test]
