@@ -41,8 +41,10 @@ const STALE_SHARE: f32 = 0.3;
 const MISSING_SHARE: f32 = 0.25;
 /// Dark parts of senders that take up no more than this share of a place's view beyond what its weights tell are not told from noise.
 const LEAST_DIM_VIEW: f32 = 0.1;
-/// Where more than this share of what a sender sends is an extension's, what was found stays: its parts have no lobes of their own.
+/// Where more than this share of what a sender sends is an extension's, what was found stays, as its parts have no lobes of their own, …
 const DIRECTIONAL_SHARE: f32 = 0.1;
+/// … unless it takes up more than this share of the view: then it hides what else there was.
+const MOST_OF_VIEW: f32 = 0.5;
 /// Points of a place lie across a line if they do by this share of their spread (of squares).
 const LEAST_SPREAD: f32 = 0.01;
 /// Irradiance × importance × √(share of all area) that a place of many leaves may be off its mean by for the edge of a shadow, as a
@@ -208,7 +210,8 @@ impl Push {
             let brings = self.means[at] * visible(link, Spread::Exact);
             let known = known.as_mut().and_then(|known| known.take(light, link, (brings, place.uneven)));
             let mut found = known.map_or_else(find, |weight| Found { weight, ..Found::default() });
-            if matches!(look, Look::Again) && is_directional(light, link.sender) {
+            let view = found.view.unwrap_or_default();
+            if matches!(look, Look::Again) && view < MOST_OF_VIEW && is_directional(light, link.sender) {
                 found.weight = Weight::of(slot);
             }
             found.weight.keep(slot);
@@ -246,8 +249,11 @@ impl Push {
                 let may_matter =
                     most * passes * uneven[link.sender as usize] > MISSING_SHARE * STALE_SHARE * irradiance;
                 let is_near = || !place.spots(light).is_far(light.element(link.sender));
-                if may_matter && is_near() && !is_directional(light, link.sender) {
-                    missing += passes * (most - place.varying(light, link).0.value).max(0.0);
+                if may_matter && is_near() {
+                    let (here, view) = place.varying(light, link);
+                    if view > MOST_OF_VIEW || !is_directional(light, link.sender) {
+                        missing += passes * (most - here.value).max(0.0);
+                    }
                 }
             });
             missing > STALE_SHARE * irradiance
