@@ -6,6 +6,7 @@
 //! next to nothing are spread evenly over flat nodes, and by orientation and distance alone over others: see
 //! [`inherited`](crate::inherited).
 
+use crate::NodeId;
 use crate::all_over::{Points, Spots};
 use crate::gather::{GROUPS, Group, share};
 use crate::hierarchy::{Element, Elements, GRAFT, Kind, SceneData};
@@ -19,7 +20,6 @@ use crate::segments::{receiving_point, visibility};
 use crate::threads;
 use crate::transport::{Light, negligible};
 use crate::visibility::Proof;
-use crate::{NodeId, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
 use std::ops::{ControlFlow, Mul};
@@ -35,16 +35,8 @@ const OWN_SHARE: f32 = 0.02;
 /// Links that bring a leaf more than this share of its light from near by, times the square root of the tolerance, are looked at from
 /// several points of it.
 const MUCH_SHARE: f32 = 0.045;
-/// Weights are found anew at places where near senders bring less by more than this share of all light than weights tell; …
-const STALE_SHARE: f32 = 0.3;
-/// … those of them that may bring less by more than this share of that are asked.
-const MISSING_SHARE: f32 = 0.25;
 /// Dark parts of senders that take up no more than this share of a place's view beyond what its weights tell are not told from noise.
 const LEAST_DIM_VIEW: f32 = 0.1;
-/// Where more than this share of what a sender sends is an extension's, what was found stays, as its parts have no lobes of their own, …
-const DIRECTIONAL_SHARE: f32 = 0.1;
-/// … unless it takes up more than this share of the view: then it hides what else there was.
-const MOST_OF_VIEW: f32 = 0.5;
 /// Points of a place lie across a line if they do by this share of their spread (of squares).
 const LEAST_SPREAD: f32 = 0.01;
 /// Irradiance × importance × √(share of all area) that a place of many leaves may be off its mean by for the edge of a shadow, as a
@@ -210,8 +202,7 @@ impl Push {
             let brings = self.means[at] * visible(link, Spread::Exact);
             let known = known.as_mut().and_then(|known| known.take(light, link, (brings, place.uneven)));
             let mut found = known.map_or_else(find, |weight| Found { weight, ..Found::default() });
-            let view = found.view.unwrap_or_default();
-            if matches!(look, Look::Again) && view < MOST_OF_VIEW && is_directional(light, link.sender) {
+            if matches!(look, Look::Again) && !renew::is_told(light, link.sender, found.view.unwrap_or_default()) {
                 found.weight = Weight::of(slot);
             }
             found.weight.keep(slot);
@@ -221,63 +212,6 @@ impl Push {
             }
         });
         (before.unwrap_or(if dim_view > LEAST_DIM_VIEW { dim_view } else { 0.0 }), rays)
-    }
-
-    /// Finds the weights of those places anew to which light comes from other parts of their senders than when they were found: by node,
-    /// a share of the light that is `uneven`, by link, what senders send of an extension's light. Returns the number of places; what is left
-    /// when `watch` breaks stays as it is.
-    pub(crate) fn renew<L: LightField>(
-        &mut self,
-        light: Light<'_, L>,
-        links: &Links,
-        (uneven, directional): (&[f32], &[Rgb]),
-        watch: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> u64 {
-        threads::map_mut(&mut self.means, 256, |at, mean| {
-            let link = &links.all()[at];
-            let directional = directional.get(at).copied().unwrap_or_default();
-            *mean = light.emitted_with(link, directional).element_sum() * link.factor;
-        });
-        let is_stale = |index: usize| {
-            let node = self.places.nodes[index];
-            let place = Place::new(light, node, self.places.middle(light.elements, node), self.error);
-            let irradiance = light.exitant.irradiance[node as usize].element_sum();
-            let mut missing = 0.0;
-            self.each_weight(light, links, index, |at, weight| {
-                let (link, most) = (&links.all()[at], weight.value * self.means[at]);
-                let passes = visible(link, Spread::Exact);
-                let may_matter =
-                    most * passes * uneven[link.sender as usize] > MISSING_SHARE * STALE_SHARE * irradiance;
-                let is_near = || !place.spots(light).is_far(light.element(link.sender));
-                if may_matter && is_near() {
-                    let (here, view) = place.varying(light, link);
-                    if view > MOST_OF_VIEW || !is_directional(light, link.sender) {
-                        missing += passes * (most - here.value).max(0.0);
-                    }
-                }
-            });
-            missing > STALE_SHARE * irradiance
-        };
-        let stale: Vec<bool> = threads::map_range(0..self.first.len() - 1, 16, is_stale);
-        let mut weights = std::mem::take(&mut self.weights);
-        let mut parts = by_place(&mut weights, &self.first, &self.places.nodes);
-        let mut parts: Vec<(usize, &mut (u32, &mut [f32]))> =
-            parts.iter_mut().enumerate().filter(|(index, _)| stale[*index]).collect();
-        let (mut renewed, mut rays, mut dim_views) = (0, 0, std::mem::take(&mut self.dim_views));
-        for part in parts.chunks_mut(BETWEEN_WATCHES * threads::current_num_threads()) {
-            if watch().is_break() {
-                break;
-            }
-            let found = threads::map_mut(part, 4, |_, (_, part)| self.find(light, links, part, Look::Again));
-            for ((index, _), (dim_view, shot)) in part.iter().zip(found) {
-                dim_views[*index] = dim_view;
-                rays += u64::from(shot);
-                renewed += 1;
-            }
-        }
-        (self.weights, self.dim_views) = (weights, dim_views);
-        self.rays += rays;
-        renewed
     }
 
     /// Places have the ids that they have after [`Elements::graft`].
@@ -402,12 +336,6 @@ impl Push {
         };
         threads::map(&self.places.joined(), 16, |&index| slope(index))
     }
-}
-
-/// Whether what a sender sends is an extension's light, by more than next to nothing.
-fn is_directional<L: LightField>(light: Light<'_, L>, sender: u32) -> bool {
-    let directional = light.exitant.directional[sender as usize].element_sum();
-    directional > DIRECTIONAL_SHARE * (directional + light.exitant.radiosity[sender as usize].element_sum())
 }
 
 /// The weights of each place that has any, by where they begin.
@@ -744,5 +672,6 @@ pub(crate) fn sample_points(scene: &SceneData, element: &Element) -> SmallVec<[(
     points.into_iter().map(at).collect()
 }
 
+mod renew;
 #[cfg(test)]
 mod tests;
