@@ -67,10 +67,9 @@ const CLOSED_RAYS: u32 = 32;
 /// … and so many for each place.
 const CLOSED_RAYS_PER_PLACE: u32 = 4;
 
-/// By place, the factors for the light of each group that balance its row, by the shares of all but the first, and what dark parts of
-/// senders take up beyond them; for nothing but the
-/// limits where nobody is to `look`. Rows are 1 where all that is seen from a side of a surface sends light: as many rays as
-/// are shot miss an opening only if it hardly counts.
+/// By place, the factors for the light of each group that balance its row, by the shares of all but the first, and by what dark parts of
+/// senders take up of its view beyond them; for nothing but the limits where nobody is to `look`. Rows are 1 where all that is seen from a
+/// side of a surface sends light: as many rays as are shot miss an opening only if it hardly counts.
 pub(crate) fn balance<L: LightField>(
     light: Light<'_, L>,
     places: &[u32],
