@@ -28,8 +28,8 @@ const PER_PAIR: u32 = 32;
 const ROUNDS: u32 = 5;
 /// What obvhs's triangle test and ours call the ends of a segment, which obvhs's query cannot vary with its length.
 const STOCK_TRIM: f32 = 1e-4;
-/// Side of such a patch in its surface's parameters.
-const PATCH: f32 = 0.125;
+/// Side of such a patch, in unit space.
+const PATCH: f32 = 0.02;
 
 /// A segment between two surfaces.
 #[derive(Clone, Copy)]
@@ -60,15 +60,17 @@ impl<'a> Areas<'a> {
         self.sums.partition_point(|&sum| sum <= choice * total).min(self.sums.len() - 1) as u32
     }
 
-    /// The `i`-th of many segments; `spread` 1 draws from whole surfaces, less from patches of that size.
+    /// The `i`-th of many segments between patches with sides of `spread`, or whole surfaces that are smaller.
     fn segment(&self, group: u32, i: u32, spread: f32) -> Segment {
         let of_group = Sampler::new(1, group);
         let choice = of_group.pair(0);
         let surfaces = [self.surface(choice.x), self.surface(choice.y)];
         let ends = [0, 1].map(|end| {
+            let surface = &self.visibility.geometries()[surfaces[end as usize] as usize];
+            let spread = (spread / surface.area(Domain::WHOLE).sqrt()).min(1.0);
             let corner = of_group.pair(1 + end) * (1.0 - spread);
             let at = corner + Sampler::new(hash(group, 7), i).pair(end) * spread;
-            self.visibility.geometries()[surfaces[end as usize] as usize].sample_area(Domain::WHOLE, at.x, at.y).0
+            surface.sample_area(Domain::WHOLE, at.x, at.y).0
         });
         Segment { from: ends[0], to: ends[1], skip: surfaces }
     }
@@ -177,7 +179,7 @@ pub fn report(
             }),
         ),
     ];
-    let random: Vec<Segment> = (0..rays).map(|i| areas.segment(i, i, 1.0)).collect();
+    let random: Vec<Segment> = (0..rays).map(|i| areas.segment(i, i, f32::MAX)).collect();
     let coherent: Vec<Segment> = (0..rays).map(|i| areas.segment(i / PER_PAIR, i % PER_PAIR, PATCH)).collect();
     for (name, segments) in [("random", random), ("between patches", coherent)] {
         let mut best = vec![(f64::INFINITY, 0); queries.len()];

@@ -1,6 +1,6 @@
 //! Visibility by rays: occlusion of segments and closest hits, over an obvhs tree.
 //!
-//! The tree is obvhs's binary one, collapsed to nodes of four children whose boxes are tested side by side. Leaves
+//! The tree is obvhs's binary one, collapsed to nodes of eight children whose boxes are tested side by side. Leaves
 //! hold the outlines of polygons, which is all that a test needs; curved surfaces are tested in f64 through their
 //! [`Geometry`]. No ray allocates, and every query is a pure function: results do not depend on the thread.
 
@@ -8,7 +8,8 @@ use crate::geometry::{Aabb, Domain, Geometry, Outline, slabs};
 use crate::sealed::Side;
 use crate::threads;
 use crate::tree::{Leaves, tree};
-use glam::{BVec4A, Vec2, Vec3, Vec3A, Vec4};
+use eight::{Eight, WIDTH};
+use glam::{Vec2, Vec3, Vec3A};
 use obvhs::Boundable;
 use obvhs::bvh2::Bvh2;
 use smallvec::SmallVec;
@@ -44,45 +45,62 @@ pub struct Hit {
     pub front: bool,
 }
 
-/// Four boxes side by side: lows and highs of x, y, z alternating, so that a direction's sign picks near and far.
+/// Boxes side by side: lows and highs of x, y, z alternating, so that a direction's sign picks near and far.
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Node {
-    bounds: [Vec4; 6],
-    /// Index of a node, or [`LEAF`] | index of a leaf.
-    children: [u32; 4],
+    bounds: [Eight; 6],
+    /// Index of a node, or [`LEAF`] | index of a leaf's first primitive.
+    children: [u32; WIDTH],
 }
 
 impl Node {
     /// Empty boxes are hit by no ray.
     const EMPTY: Self = {
-        let (low, high) = (Vec4::INFINITY, Vec4::NEG_INFINITY);
-        Self { bounds: [low, high, low, high, low, high], children: [0; 4] }
+        let (low, high) = (Eight::INFINITY, Eight::NEG_INFINITY);
+        Self { bounds: [low, high, low, high, low, high], children: [0; WIDTH] }
     };
 }
 
-/// A run of primitives.
-#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Leaf {
-    first: u32,
-    count: u32,
+/// One surface as the tree's leaves hold it: all that a test of a polygon needs, in one line of a cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Primitive {
+    /// Nothing, of curved surfaces.
+    outline: Outline,
+    /// Its id, and marks: [`LAST`], [`CURVED`].
+    surface: u32,
 }
 
-/// One surface as the tree's leaves hold it.
-#[derive(Clone, Copy, Debug)]
-enum Primitive {
-    Polygon(Outline),
-    Curved,
-}
+/// Marks the last primitive of a leaf, …
+const LAST: u32 = 1 << 31;
+/// … and one whose surface is no polygon.
+const CURVED: u32 = 1 << 30;
 
 impl Primitive {
-    fn of(geometry: &Geometry) -> Self {
-        match geometry {
-            Geometry::Triangle(triangle) => Self::Polygon(triangle.outline()),
-            Geometry::Quad(quad) => Self::Polygon(quad.outline()),
-            Geometry::Revolution(_) => Self::Curved,
-        }
+    fn of(geometry: &Geometry, surface: u32, is_last: bool) -> Self {
+        let (outline, curved) = match geometry {
+            Geometry::Triangle(triangle) => (triangle.outline(), 0),
+            Geometry::Quad(quad) => (quad.outline(), 0),
+            Geometry::Revolution(_) => (Outline::NONE, CURVED),
+        };
+        Self { outline, surface: surface | curved | if is_last { LAST } else { 0 } }
+    }
+
+    #[inline(always)]
+    fn surface(&self) -> u32 {
+        self.surface & !(LAST | CURVED)
+    }
+
+    #[inline(always)]
+    fn is_last(&self) -> bool {
+        self.surface & LAST != 0
+    }
+
+    /// Its outline, if it is a polygon.
+    #[inline(always)]
+    fn polygon(&self) -> Option<&Outline> {
+        (self.surface & CURVED == 0).then_some(&self.outline)
     }
 }
 
@@ -93,64 +111,61 @@ pub(crate) struct Region {
     pub(crate) heights: [f32; 2],
 }
 
-/// Points up to a height along a normal, for tests of four boxes side by side.
+/// Points up to a height along a normal, for tests of boxes side by side.
 struct HalfSpace {
-    normal: [Vec4; 3],
-    height: Vec4,
+    normal: Vec3,
+    height: f32,
     /// Indices in [`Node::bounds`] of those that lie lowest along the normal.
     lowest: [usize; 3],
 }
 
 impl HalfSpace {
     fn new(normal: Vec3, height: f32) -> Self {
-        Self {
-            normal: normal.to_array().map(Vec4::splat),
-            height: Vec4::splat(height),
-            lowest: [0, 1, 2].map(|axis| 2 * axis + usize::from(normal[axis] < 0.0)),
-        }
+        Self { normal, height, lowest: [0, 1, 2].map(|axis| 2 * axis + usize::from(normal[axis] < 0.0)) }
     }
 
     /// The least heights of a node's boxes.
-    #[inline]
-    fn least(&self, bounds: &[Vec4; 6]) -> Vec4 {
-        let ([a, b, c], [x, y, z]) = (self.normal, self.lowest);
-        a * bounds[x] + b * bounds[y] + c * bounds[z]
+    #[inline(always)]
+    fn least(&self, node: &Node) -> Eight {
+        let term = |axis: usize| Eight::splat(self.normal[axis]) * node.bounds[self.lowest[axis]];
+        term(0) + term(1) + term(2)
     }
 
     /// Which of a node's boxes reach into it.
-    #[inline]
-    fn meets(&self, bounds: &[Vec4; 6]) -> BVec4A {
-        self.least(bounds).cmple(self.height)
+    #[inline(always)]
+    fn meets(&self, node: &Node) -> u32 {
+        self.least(node).at_most(Eight::splat(self.height))
     }
 }
 
 /// A ray with what slab tests need.
 struct Ray {
-    origins: [Vec4; 3],
-    reciprocals: [Vec4; 3],
+    origins: [Eight; 3],
+    reciprocals: [Eight; 3],
     /// Index of the near bound in [`Node::bounds`], by axis.
     near: [usize; 3],
 }
 
 impl Ray {
+    #[inline(always)]
     fn new(origin: Vec3, direction: Vec3) -> Self {
         let reciprocal = slabs::reciprocal(direction);
         let axis = |i: usize| 2 * i + usize::from(reciprocal[i] < 0.0);
         Self {
-            origins: [0, 1, 2].map(|i| Vec4::splat(origin[i])),
-            reciprocals: [0, 1, 2].map(|i| Vec4::splat(reciprocal[i])),
+            origins: origin.to_array().map(Eight::splat),
+            reciprocals: reciprocal.to_array().map(Eight::splat),
             near: [axis(0), axis(1), axis(2)],
         }
     }
 
     /// Where the ray enters each of a node's boxes, and which of them it meets between `t_min` and `t_max`.
-    #[inline]
-    fn enter(&self, node: &Node, t_min: f32, t_max: f32) -> (Vec4, u32) {
+    #[inline(always)]
+    fn enter(&self, node: &Node, t_min: f32, t_max: f32) -> (Eight, u32) {
         let [x, y, z] = self.near;
         let slab = |bound: usize, axis: usize| (node.bounds[bound] - self.origins[axis]) * self.reciprocals[axis];
-        let near = slab(x, 0).max(slab(y, 1)).max(slab(z, 2)).max(Vec4::splat(t_min));
-        let far = slab(x ^ 1, 0).min(slab(y ^ 1, 1)).min(slab(z ^ 1, 2)) * slabs::GROWTH;
-        (near, near.cmple(far.min(Vec4::splat(t_max))).bitmask())
+        let near = slab(x, 0).max(slab(y, 1)).max(slab(z, 2)).max(Eight::splat(t_min));
+        let far = slab(x ^ 1, 0).min(slab(y ^ 1, 1)).min(slab(z ^ 1, 2)) * Eight::splat(slabs::GROWTH);
+        (near, near.at_most(far.min(Eight::splat(t_max))))
     }
 }
 
@@ -184,10 +199,8 @@ impl Span {
 pub struct Visibility {
     geometries: Vec<Geometry>,
     nodes: Vec<Node>,
-    leaves: Vec<Leaf>,
+    /// Leaf by leaf.
     primitives: Vec<Primitive>,
-    /// Surface of each primitive.
-    surfaces: Vec<u32>,
     /// Primitive of each surface.
     primitive_of: Vec<u32>,
 }
@@ -208,9 +221,7 @@ impl Visibility {
         let mut visibility = Self {
             geometries: geometries.to_vec(),
             nodes: Vec::new(),
-            leaves: Vec::new(),
             primitives: Vec::with_capacity(geometries.len()),
-            surfaces: Vec::with_capacity(geometries.len()),
             primitive_of: vec![0; geometries.len()],
         };
         if !bvh.nodes.is_empty() {
@@ -239,7 +250,7 @@ impl Visibility {
     pub fn occluded(&self, from: Vec3, to: Vec3, skip: [u32; 2], cache: &mut u32) -> bool {
         let Some(span) = Span::new(from, to, skip) else { return false };
         if let Some(&primitive) = self.primitive_of.get(*cache as usize)
-            && self.blocks(primitive, &span)
+            && self.blocks(&self.primitives[primitive as usize], &span)
         {
             return true;
         }
@@ -253,15 +264,14 @@ impl Visibility {
                 let node = &self.nodes[index as usize];
                 let (_, mut mask) = ray.enter(node, span.t_min, span.t_max);
                 while mask != 0 {
-                    stack.push(node.children[mask.trailing_zeros() as usize & 3]);
+                    stack.push(node.children[mask.trailing_zeros() as usize & (WIDTH - 1)]);
                     mask &= mask - 1;
                 }
                 continue;
             }
-            let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
-            for primitive in first..first + count {
+            for primitive in self.leaf(index) {
                 if self.blocks(primitive, &span) {
-                    *cache = self.surfaces[primitive as usize];
+                    *cache = primitive.surface();
                     return true;
                 }
             }
@@ -270,16 +280,25 @@ impl Visibility {
     }
 
     /// Whether a primitive blocks a segment.
-    #[inline]
-    fn blocks(&self, primitive: u32, span: &Span) -> bool {
-        let surface = self.surfaces[primitive as usize];
-        match &self.primitives[primitive as usize] {
-            Primitive::Polygon(outline) => {
-                !span.skip.contains(&surface)
-                    && outline.intersect(span.from, span.direction, span.t_min, span.t_max).is_some()
+    #[inline(always)]
+    fn blocks(&self, primitive: &Primitive, span: &Span) -> bool {
+        let surface = primitive.surface();
+        match primitive.polygon() {
+            Some(outline) => {
+                outline.intersect(span.from, span.direction, span.t_min, span.t_max).is_some()
+                    && !span.skip.contains(&surface)
             }
-            Primitive::Curved => self.curved_blocks(surface, span),
+            None => self.curved_blocks(surface, span),
         }
+    }
+
+    /// The primitives of a leaf.
+    #[inline(always)]
+    fn leaf(&self, index: u32) -> impl Iterator<Item = &Primitive> {
+        let mut ended = false;
+        self.primitives[(index & !LEAF) as usize..]
+            .iter()
+            .take_while(move |primitive| !std::mem::replace(&mut ended, primitive.is_last()))
     }
 
     /// Whether a surface that is no polygon blocks a segment, with its own ends taken into account.
@@ -362,10 +381,9 @@ impl Visibility {
                 push_children(&mut stack, node, near, mask);
                 continue;
             }
-            let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
-            for primitive in first..first + count {
+            for primitive in self.leaf(index) {
                 if let Some(t) = self.meets(primitive, (origin, direction), (t_min, best.0), (own, length)) {
-                    best = (t, Some(self.surfaces[primitive as usize]));
+                    best = (t, Some(primitive.surface()));
                 }
             }
         }
@@ -373,19 +391,19 @@ impl Visibility {
     }
 
     /// Where a ray, whose direction has a length, meets a primitive between two distances, if not on its `own` surface.
-    #[inline]
+    #[inline(always)]
     fn meets(
         &self,
-        primitive: u32,
+        primitive: &Primitive,
         (origin, direction): (Vec3, Vec3),
         (t_min, t_max): (f32, f32),
         (own, length): (u32, f32),
     ) -> Option<f32> {
-        let surface = self.surfaces[primitive as usize];
-        match &self.primitives[primitive as usize] {
-            Primitive::Polygon(_) if surface == own => None,
-            Primitive::Polygon(outline) => outline.intersect(origin, direction, t_min, t_max),
-            Primitive::Curved => {
+        let surface = primitive.surface();
+        match primitive.polygon() {
+            Some(_) if surface == own => None,
+            Some(outline) => outline.intersect(origin, direction, t_min, t_max),
+            None => {
                 let geometry = &self.geometries[surface as usize];
                 if surface == own && geometry.is_flat() {
                     return None;
@@ -405,44 +423,42 @@ impl Visibility {
 
     /// Whether any surface whose box, about, reaches into a box and all of some half-spaces is `wanted`.
     fn any_within(&self, within: &Aabb, sides: &[HalfSpace], mut wanted: impl FnMut(u32) -> bool) -> bool {
-        let [low, high] = [within.min, within.max].map(|p| p.to_array().map(Vec4::splat));
+        let [low, high] = [within.min, within.max].map(|p| p.to_array().map(Eight::splat));
         let mut stack: SmallVec<[u32; 64]> = SmallVec::new();
         if !self.nodes.is_empty() {
             stack.push(0);
         }
         while let Some(index) = stack.pop() {
             if index & LEAF == 0 {
-                let Node { bounds, children } = &self.nodes[index as usize];
-                let overlap = |axis: usize| bounds[2 * axis].cmple(high[axis]) & bounds[2 * axis + 1].cmpge(low[axis]);
-                let mut met = overlap(0) & overlap(1) & overlap(2);
-                for side in sides {
-                    met &= side.meets(bounds);
-                }
-                let mut mask = met.bitmask();
+                let node = &self.nodes[index as usize];
+                let overlap = |axis: usize| {
+                    node.bounds[2 * axis].at_most(high[axis]) & low[axis].at_most(node.bounds[2 * axis + 1])
+                };
+                let met = overlap(0) & overlap(1) & overlap(2);
+                let mut mask = sides.iter().fold(met, |met, side| met & side.meets(node));
                 while mask != 0 {
-                    stack.push(children[mask.trailing_zeros() as usize & 3]);
+                    stack.push(node.children[mask.trailing_zeros() as usize & (WIDTH - 1)]);
                     mask &= mask - 1;
                 }
                 continue;
             }
-            let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
-            if self.surfaces[first as usize..(first + count) as usize].iter().any(|&surface| wanted(surface)) {
+            if self.leaf(index).any(|primitive| wanted(primitive.surface())) {
                 return true;
             }
         }
         false
     }
 
-    /// Turns the binary tree into nodes of four children, parents before children.
+    /// Turns the binary tree into nodes of eight children, parents before children.
     fn collapse(&mut self, bvh: &Bvh2, groups: &Groups) {
         // Nodes still to be filled, with the binary node that each stands for.
         let mut pending = vec![(0, 0)];
         self.nodes.push(Node::EMPTY);
         while let Some((target, source)) = pending.pop() {
-            let mut children: SmallVec<[usize; 4]> = SmallVec::new();
+            let mut children: SmallVec<[usize; WIDTH]> = SmallVec::new();
             children.push(source);
             // The largest inner child gives way to its own children while there is room.
-            while children.len() < 4 {
+            while children.len() < WIDTH {
                 let largest = (0..children.len())
                     .filter(|&i| !bvh.nodes[children[i]].is_leaf())
                     .max_by(|&a, &b| half_area(bvh, children[a]).total_cmp(&half_area(bvh, children[b])));
@@ -454,8 +470,8 @@ impl Visibility {
             for (i, &child) in children.iter().enumerate() {
                 let node = &bvh.nodes[child];
                 for axis in 0..3 {
-                    self.nodes[target].bounds[2 * axis][i] = node.aabb().min[axis];
-                    self.nodes[target].bounds[2 * axis + 1][i] = node.aabb().max[axis];
+                    self.nodes[target].bounds[2 * axis].set(i, node.aabb().min[axis]);
+                    self.nodes[target].bounds[2 * axis + 1].set(i, node.aabb().max[axis]);
                 }
                 self.nodes[target].children[i] = if node.is_leaf() {
                     let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
@@ -475,20 +491,21 @@ impl Visibility {
         let first = self.primitives.len() as u32;
         for &surface in groups.flatten() {
             self.primitive_of[surface as usize] = self.primitives.len() as u32;
-            self.surfaces.push(surface);
-            self.primitives.push(Primitive::of(&self.geometries[surface as usize]));
+            self.primitives.push(Primitive::of(&self.geometries[surface as usize], surface, false));
         }
-        self.leaves.push(Leaf { first, count: self.primitives.len() as u32 - first });
-        self.leaves.len() as u32 - 1
+        if let Some(last) = self.primitives.last_mut() {
+            last.surface |= LAST;
+        }
+        first
     }
 }
 
 /// Puts those of a node's children that a mask has on a stack, the nearest last, to be popped first.
-#[inline]
-fn push_children(stack: &mut SmallVec<[(u32, f32); 64]>, node: &Node, near: Vec4, mut mask: u32) {
-    let base = stack.len();
+#[inline(always)]
+fn push_children(stack: &mut SmallVec<[(u32, f32); 64]>, node: &Node, near: Eight, mut mask: u32) {
+    let (near, base) = (near.to_array(), stack.len());
     while mask != 0 {
-        let child = mask.trailing_zeros() as usize & 3;
+        let child = mask.trailing_zeros() as usize & (WIDTH - 1);
         mask &= mask - 1;
         stack.push((node.children[child], near[child]));
         let mut at = stack.len() - 1;
@@ -554,6 +571,7 @@ impl Groups {
 }
 
 mod beam;
+mod eight;
 mod keep;
 mod shaft;
 #[cfg(test)]

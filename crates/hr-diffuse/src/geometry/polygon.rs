@@ -174,20 +174,24 @@ impl Quad {
 /// edges side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Outline {
-    x: Vec4,
-    y: Vec4,
-    z: Vec4,
+    x: [f32; 4],
+    y: [f32; 4],
+    z: [f32; 4],
     normal: Vec3,
 }
 
 impl Outline {
+    /// That of no polygon.
+    pub(crate) const NONE: Self = Self { x: [0.0; 4], y: [0.0; 4], z: [0.0; 4], normal: Vec3::ZERO };
+
     fn new([a, b, c, d]: [Vec3; 4], normal: Vec3) -> Self {
-        Self {
-            x: Vec4::new(a.x, b.x, c.x, d.x),
-            y: Vec4::new(a.y, b.y, c.y, d.y),
-            z: Vec4::new(a.z, b.z, c.z, d.z),
-            normal,
-        }
+        Self { x: [a.x, b.x, c.x, d.x], y: [a.y, b.y, c.y, d.y], z: [a.z, b.z, c.z, d.z], normal }
+    }
+
+    /// Its corners as seen from a point.
+    #[inline(always)]
+    fn from(&self, origin: Vec3) -> [Vec4; 3] {
+        [Vec4::from(self.x) - origin.x, Vec4::from(self.y) - origin.y, Vec4::from(self.z) - origin.z]
     }
 
     /// Where a ray meets the polygon, from either side, with `t_min` < t < `t_max`.
@@ -195,9 +199,9 @@ impl Outline {
     /// The test is by signed volumes of the ray and the edges (Plücker coordinates), relative to the origin of the
     /// ray. An edge's volume changes its sign and no other bit when its corners change places, so a ray that
     /// passes between two polygons by rounding passes between no two that share an edge.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn intersect(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<f32> {
-        let corners @ [x, y, z] = [self.x - origin.x, self.y - origin.y, self.z - origin.z];
+        let corners @ [x, y, z] = self.from(origin);
         let [a, b, c] = edge_planes(corners);
         let volumes = a * direction.x + b * direction.y + c * direction.z;
         let tolerance = EDGE_TOLERANCE * volumes.element_sum().abs();
@@ -214,7 +218,7 @@ impl Outline {
 
     /// Whether some edge has the polygon on one side, and on the other all rays from `origin` that run between four `directions`.
     pub(crate) fn is_beside(&self, origin: Vec3, directions: &[Vec3; 4]) -> bool {
-        let corners @ [x, y, z] = [self.x - origin.x, self.y - origin.y, self.z - origin.z];
+        let corners @ [x, y, z] = self.from(origin);
         let [a, b, c] = edge_planes(corners);
         let (mut low, mut high, mut all) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0.0);
         for direction in directions {
@@ -236,7 +240,7 @@ impl Outline {
 /// Whether the line through the origin along a direction passes the box around a polygon, but for rounding. One that runs in
 /// the polygon's plane but far from it may have edge functions that are all rounding, of either sign, and a cosine with the
 /// normal that is the rounding of so small a polygon's corners.
-#[inline]
+#[inline(always)]
 fn is_toward(corners: &[Vec4; 3], direction: Vec3) -> bool {
     let reciprocal = slabs::reciprocal(direction);
     let (mut near, mut far) = (f32::NEG_INFINITY, f32::INFINITY);
@@ -249,7 +253,7 @@ fn is_toward(corners: &[Vec4; 3], direction: Vec3) -> bool {
 }
 
 /// Twice the normals of the planes through the origin and each edge of a polygon.
-#[inline]
+#[inline(always)]
 fn edge_planes([x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
     let (nx, ny, nz) = (x.yzwx(), y.yzwx(), z.yzwx());
     let (ex, ey, ez) = (nx - x, ny - y, nz - z);

@@ -10,7 +10,7 @@ pub(crate) const GROWTH: f32 = 1.0 + 8.0 * f32::EPSILON;
 const PARALLEL: f32 = 1e-30;
 
 /// One over each component of a direction, finite.
-#[inline]
+#[inline(always)]
 pub(crate) fn reciprocal(direction: Vec3) -> Vec3 {
     direction.map(|d| if d.abs() < PARALLEL { PARALLEL.copysign(d) } else { d }.recip())
 }

@@ -4,8 +4,9 @@
 //! The tree is walked front to back with the pyramid that holds the rays. A polygon that all of them meet hides what lies
 //! deeper, so that few surfaces are left, and these are tested nearest first, without the tree.
 
-use super::{HalfSpace, LEAF, Leaf, NO_BLOCKER, Primitive, Visibility, push_children};
-use glam::{DVec3, Vec3, Vec4};
+use super::eight::Eight;
+use super::{HalfSpace, LEAF, NO_BLOCKER, Primitive, Visibility, push_children};
+use glam::{DVec3, Vec3};
 use smallvec::SmallVec;
 
 /// Surfaces that are worth a list, at most: rays against more of them are faster through the tree.
@@ -99,27 +100,24 @@ impl Visibility {
             }
             if index & LEAF == 0 {
                 let node = &self.nodes[index as usize];
-                let near = depths.least(&node.bounds) - (eye + pyramid.slack);
-                let inside = pyramid
-                    .halves
-                    .iter()
-                    .fold(near.cmple(Vec4::splat(far)), |inside, half| inside & half.meets(&node.bounds));
-                push_children(&mut stack, node, near, inside.bitmask());
+                let near = depths.least(node) - Eight::splat(eye + pyramid.slack);
+                let before = near.at_most(Eight::splat(far));
+                let inside = pyramid.halves.iter().fold(before, |inside, half| inside & half.meets(node));
+                push_children(&mut stack, node, near, inside);
                 continue;
             }
-            let Leaf { first, count } = self.leaves[(index & !LEAF) as usize];
-            for primitive in first..first + count {
-                let geometry = &self.geometries[self.surfaces[primitive as usize] as usize];
+            for primitive in self.leaf(index) {
+                let geometry = &self.geometries[primitive.surface() as usize];
                 let depth = geometry.lowest(axis) - (eye + pyramid.slack);
                 if depth > far || pyramid.sides.iter().any(|&(normal, height)| geometry.lowest(normal) > height) {
                     continue;
                 }
-                if let Primitive::Polygon(outline) = &self.primitives[primitive as usize]
+                if let Some(outline) = primitive.polygon()
                     && outline.is_beside(origin, &pyramid.corners)
                 {
                     continue;
                 }
-                if let Some(whole) = self.spans(primitive, &pyramid, t_min)
+                if let Some(whole) = spans(primitive, &pyramid, t_min)
                     && whole < far
                 {
                     far = whole;
@@ -129,22 +127,11 @@ impl Visibility {
                 if met.len() == MOST_MET {
                     return None;
                 }
-                met.push((depth, primitive));
+                met.push((depth, self.primitive_of[primitive.surface() as usize]));
             }
         }
         met.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         Some(Beam { origin, axis, t_min, spanned, met })
-    }
-
-    /// The depth at which all rays have met a primitive, if it is a polygon across all of the pyramid: that of one of the corners.
-    fn spans(&self, primitive: u32, pyramid: &Pyramid, t_min: f32) -> Option<f32> {
-        let Primitive::Polygon(outline) = &self.primitives[primitive as usize] else { return None };
-        let mut most = 0.0_f32;
-        for corner in pyramid.corners {
-            let t = outline.intersect(pyramid.origin, corner, 2.0 * t_min, f32::MAX)?;
-            most = most.max(t * corner.dot(pyramid.axis));
-        }
-        Some(most * (1.0 + SLACK) + pyramid.slack)
     }
 
     /// Surface and distance that [`closest`](Self::closest) finds for a ray of a beam, in a unit `direction`.
@@ -156,10 +143,22 @@ impl Visibility {
             if depth > best.0 * along {
                 break;
             }
+            let primitive = &self.primitives[primitive as usize];
             if let Some(t) = self.meets(primitive, (beam.origin, direction), (beam.t_min, best.0), (NO_BLOCKER, 1.0)) {
-                best = (t, Some(self.surfaces[primitive as usize]));
+                best = (t, Some(primitive.surface()));
             }
         }
         best.1.map(|surface| (surface, best.0))
     }
+}
+
+/// The depth at which all rays have met a primitive, if it is a polygon across all of the pyramid: that of one of the corners.
+fn spans(primitive: &Primitive, pyramid: &Pyramid, t_min: f32) -> Option<f32> {
+    let outline = primitive.polygon()?;
+    let mut most = 0.0_f32;
+    for corner in pyramid.corners {
+        let t = outline.intersect(pyramid.origin, corner, 2.0 * t_min, f32::MAX)?;
+        most = most.max(t * corner.dot(pyramid.axis));
+    }
+    Some(most * (1.0 + SLACK) + pyramid.slack)
 }

@@ -227,7 +227,9 @@ impl Visibility {
             Proof::Free => false,
             Proof::Blocked => true,
             Proof::Among(surfaces) => Span::new(from, to, skip).is_some_and(|span| {
-                surfaces.iter().any(|&surface| self.blocks(self.primitive_of[surface as usize], &span))
+                surfaces
+                    .iter()
+                    .any(|&surface| self.blocks(&self.primitives[self.primitive_of[surface as usize] as usize], &span))
             }),
             Proof::Unknown => self.occluded(from, to, skip, cache),
         }
