@@ -23,8 +23,8 @@ use std::sync::{Arc, OnceLock};
 
 /// Direction for which a lobe is typical: 37° off the normal.
 const TYPICAL: Vec3 = Vec3::new(0.6, 0.0, 0.8);
-/// In light transport lobes are at least as wide as this makes them (standard deviation in radians, about 1.7°):
-/// what distributions of level 6 resolve. Narrower ones are followed by rays at display.
+/// In light transport lobes are at least as wide as a disk of this angular radius (radians, 1.7°): what distributions of level 6
+/// resolve. Narrower ones are followed by rays at display.
 const NARROWEST: f32 = 0.03;
 /// Triangles that are no wider than this share of the finest detail are not divided: at their corners and in their middles
 /// a disk of that radius is met several times.
@@ -244,6 +244,10 @@ impl<B: Basis> GlossyField<B> {
         let narrowest = (2.0 * arrived.spread).clamp(NARROWEST, FRAC_PI_2);
         // A lobe that is not round is narrower one way; a mirror shows everything.
         let is_wide = material.mirror.is_none() && material.reflector.grain().is_none();
+        // A disk has half its radius as standard deviation; what has a width of its own needs to be widened the less.
+        let own = if is_wide { 2.0 * width } else { 0.0 };
+        let lacks = (NARROWEST * NARROWEST - own * own).max(0.0).sqrt();
+        let least_extent = lacks.max(2.0 * arrived.spread).min(FRAC_PI_2);
         let close = if is_wide { width.max(narrowest) } else { narrowest };
         let flat = hierarchy.is_flat(leaf);
         // What goes on to other leaves is spread by how far away they are; only who looks at a highlight sees its edge.
@@ -273,7 +277,7 @@ impl<B: Basis> GlossyField<B> {
             merge_weak(&mut incident, width.max(narrowest), share, |sample| peak(sample) >= bright);
             // Extents matter beside the lobe's own width only; without one a sample is reflected several times faster.
             for sample in &mut incident {
-                sample.widen(if width < WIDE * narrowest { narrowest } else { 0.0 });
+                sample.widen(if width < WIDE * narrowest { least_extent } else { 0.0 });
                 if sample.reach() * WIDE < width {
                     sample.shrink();
                 }

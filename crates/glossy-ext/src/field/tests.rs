@@ -1,5 +1,5 @@
 use super::*;
-use crate::reflector::MetallicRoughness;
+use crate::reflector::{MetallicRoughness, Ward};
 use glam::Vec2;
 
 /// A floor, lit from points at a distance of 10.
@@ -267,4 +267,37 @@ fn parts_of_one_lamp_hide_no_other() {
     let toward = Vec3::new(-small.x, -small.y, small.z);
     let (shown, right) = (field.project(&reflection).eval(toward).x, reflection.toward(toward).x);
     assert!((shown / right - 1.0).abs() < 0.1, "the small one is {shown}, not {right}");
+}
+
+/// A lobe that transport resolves as it is stays so sharp, whatever lights it; a narrower one becomes no wider than what is resolved.
+#[test]
+fn lobes_are_widened_to_what_transport_resolves() {
+    // Second moment about the mirrored direction across the plane of reflection, radians².
+    let spread = |slope: f32| {
+        let polished: Arc<dyn Reflector> = Arc::new(Ward::new(Rgb::ZERO, Rgb::ONE, slope).expect("polished"));
+        let field = GlossyField::new(&[polished], Refinement::default());
+        let floor = Floor { points: vec![TYPICAL] };
+        let mut incident = SampleSet::new();
+        let irradiance = Rgb::ONE;
+        field.receive(&mut incident, &Transfer { sender: NodeId(1), direction: TYPICAL, irradiance, oriented: true });
+        let arrived =
+            Arrived { irradiance, diffuse: Rgb::ZERO, spread: 0.0, negligible: 0.0, error: 0.1, shown: false };
+        let reflection = field.reflection(&floor, FLOOR, &[&incident], arrived).expect("it is lit");
+        let mirrored = Vec3::new(-TYPICAL.x, 0.0, TYPICAL.z);
+        let along = Vec3::new(TYPICAL.z, 0.0, TYPICAL.x);
+        let (mut moment, mut all) = (0.0, 0.0);
+        for (i, k) in (-80..=80_i16).flat_map(|i| (-80..=80_i16).map(move |k| (i, k))) {
+            let [across, up] = [i, k].map(|at| f32::from(at) * 0.2 / 80.0);
+            let light = reflection.toward((mirrored + Vec3::Y * across + along * up).normalize()).x;
+            moment += light * across * across;
+            all += light;
+        }
+        (moment / all).sqrt()
+    };
+    // Twice the slope's own, narrower by the cosine (0.8) across.
+    let own = |slope: f32| 2.0 * slope * 0.5_f32.sqrt() * TYPICAL.z;
+    let (sharp, sharper) = (spread(0.03), spread(0.003));
+    assert!((sharp / own(0.03) - 1.0).abs() < 0.03, "{sharp} rad, not {}", own(0.03));
+    let resolved = 0.5 * NARROWEST;
+    assert!((sharper / resolved - 1.0).abs() < 0.15, "{sharper} rad, not {resolved}");
 }
