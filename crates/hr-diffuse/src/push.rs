@@ -587,7 +587,8 @@ impl Place {
         // A place that is small or far is told apart by its orientation; so is one that gets next to nothing.
         let sender = light.element(link.sender);
         let far = self.spots(light).is_far(sender);
-        if far && mean * visible * self.turned(light, link) < self.faint {
+        let may_be_visible = if link.visibility < 0.0 { visible } else { visible.max(MAY_BE_VISIBLE) };
+        if far && mean * may_be_visible * self.turned(light, link) < self.faint {
             let weight = Weight { unseen: link.visibility >= 0.0, ..self.plain(light, link) };
             return Found { weight, ..Found::default() };
         }
