@@ -556,6 +556,12 @@ impl<B: Basis> LightField for GlossyField<B> {
         self.material(Some(material)).map(|m| m.albedo)
     }
 
+    fn directional_albedo(&self, material: u32, cosine: f32) -> Option<Rgb> {
+        let direction = Vec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
+        let incident = Incident { direction, irradiance: Rgb::ONE, ..Incident::default() };
+        self.material(Some(material)).map(|material| material.reflected(&[incident]))
+    }
+
     /// Of lobes narrower than light transport resolves nothing is told: they are followed by rays at display, and finer links would show
     /// nowhere.
     fn lobe_width(&self, material: u32) -> Option<f32> {

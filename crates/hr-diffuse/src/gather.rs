@@ -2,6 +2,7 @@
 
 use crate::Rgb;
 use crate::calibrate::{Expected, calibrate};
+use crate::faint::Grazing;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::{LightField, NodeId, Transfer};
 use crate::inherited::Carried;
@@ -14,7 +15,7 @@ use crate::reflect::Sends;
 use crate::shooting::Shot;
 use crate::threads;
 use crate::transport::Light;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use std::ops::ControlFlow;
 
 /// Links that a thread evaluates between two calls of `watch`: about a millisecond.
@@ -472,6 +473,31 @@ impl Gather {
             });
         }
         ControlFlow::Continue(())
+    }
+
+    /// By leaf, how many times the mean its material reflects beside the diffuse part of what arrived there last.
+    pub(crate) fn grazing<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        links: &Links,
+        grazing: &Grazing,
+    ) -> Vec<(u32, f32)> {
+        let arriving = self.arriving.iter().map(|arriving| arriving.element_sum().max(0.0));
+        let weighed: Vec<Vec2> = links
+            .all()
+            .iter()
+            .zip(arriving)
+            .map(|(link, arriving)| {
+                let receiver = light.element(link.receiver);
+                let direction = light.direction_to(receiver.center, link.sender);
+                let knows = receiver.is_patch() && receiver.is_flat();
+                let times =
+                    if knows { grazing.times(receiver.material, direction.dot(receiver.normals.axis)) } else { 1.0 };
+                Vec2::new(arriving, arriving * times)
+            })
+            .collect();
+        let times = |sum: Vec2| if sum.x > 0.0 { (sum.y / sum.x).max(0.0) } else { 1.0 };
+        self.on_leaves(light, links, &weighed).into_iter().map(|(leaf, sum)| (leaf, times(sum))).collect()
     }
 
     /// Irradiance of all leaves.

@@ -235,6 +235,12 @@ pub trait LightField: Sync {
     /// where they do not take part. Nodes without any active surface below them are never visited. An engine may
     /// carry the light of materials that reflect next to nothing this way as diffuse light until it is shown.
     fn active(&self, material: u32) -> Option<Rgb>;
+    /// Of light from a direction of this cosine (0…1) to the normal, what surfaces of this material reflect beside the diffuse part: the
+    /// directional-hemispherical reflectance, whose mean, weighted by cosines, [`active`](Self::active) tells. An engine that carries
+    /// it as diffuse light knows so how much that is.
+    fn directional_albedo(&self, material: u32, _cosine: f32) -> Option<Rgb> {
+        self.active(material)
+    }
     /// Width of the lobe that surfaces of this material reflect light in, as the standard deviation per axis in radians, so that links
     /// to them need be no finer than it can tell; `None` where they do not take part.
     fn lobe_width(&self, material: u32) -> Option<f32> {

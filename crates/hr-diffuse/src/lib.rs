@@ -26,6 +26,7 @@ pub mod error;
 mod exposed;
 pub mod face_clusters;
 pub mod facing;
+mod faint;
 mod feedback;
 pub mod flat;
 mod footprint;

@@ -8,6 +8,7 @@ use crate::contact_shadows;
 use crate::convergence::Convergence;
 use crate::error::SolveError;
 use crate::exposed::expose;
+use crate::faint::{Grazing, most_times};
 use crate::feedback::Feedback;
 use crate::gather::Gather;
 use crate::geometry::{Geometry, Normalization};
@@ -32,7 +33,7 @@ use crate::threads;
 use crate::transport::{Exitant, Light};
 use crate::twins::twins;
 use crate::visibility::Visibility;
-use crate::{Facing, LightKind, Rgb, SceneInput};
+use crate::{DiffuseMaterial, Facing, LightKind, Rgb, SceneInput};
 use glam::DVec3;
 use std::ops::ControlFlow;
 
@@ -44,7 +45,7 @@ const SHADOW_SHARE: f32 = 0.025;
 /// Elements are not split below this share of the tolerance's square root, times the size of a room: features smaller than that are not resolved.
 const SMALLEST_SHARE: f32 = 0.008;
 /// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
-/// diffuse light until it is shown.
+/// diffuse light until it is shown; and bright ones, no more than the error times all that they reflect: most of their light is diffuse anyhow.
 const FAINT_SHARE: f32 = 0.7;
 /// Iterations end when all that are to come would change the solution by less than this share of the error.
 const CONVERGED_SHARE: f32 = 0.02;
@@ -184,6 +185,8 @@ pub struct Solver<L: LightField = ()> {
     /// By material: what is reflected beside the diffuse part, if it is so little that transport carries it as
     /// diffuse light.
     pub(crate) faint: Vec<Rgb>,
+    /// By leaf, how many times that it reflects of what arrives there; as much as on average where nothing is told.
+    faint_times: Vec<f32>,
     /// By material: what is reflected beside the diffuse part as directional light.
     pub(crate) strong: Vec<Rgb>,
     /// By leaf, what it sends of the extension's light.
@@ -254,7 +257,7 @@ impl<L: LightField> Solver<L> {
         (field, incident, reflected): (L, Vec<L::Incident>, Vec<L::Exitant>),
         settings: Settings,
     ) -> Self {
-        let (faint, strong) = sorted(&field, scene.materials.len(), settings.error);
+        let (faint, strong) = sorted(&field, &scene.materials, settings.error);
         let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
         let mut solver = Self {
             scene,
@@ -276,6 +279,7 @@ impl<L: LightField> Solver<L> {
             weighed_by: LightThen::default(),
             linked: Linked::default(),
             faint,
+            faint_times: Vec::new(),
             strong,
             sent: Vec::new(),
             shown: Vec::new(),
@@ -646,7 +650,7 @@ impl<L: LightField> Solver<L> {
 
     /// Tells materials whose extension's light travels as diffuse light from the others.
     pub(crate) fn sort_materials(&mut self) {
-        (self.faint, self.strong) = sorted(&self.field, self.scene.materials.len(), self.settings.error);
+        (self.faint, self.strong) = sorted(&self.field, &self.scene.materials, self.settings.error);
     }
 
     /// Takes note of the memory in use.
@@ -746,6 +750,7 @@ impl<L: LightField> Solver<L> {
             return None;
         }
         self.push();
+        self.weigh_faint();
         let residual = self.extrapolate(&before);
         let middle = Instant::now();
         self.reflect_senders(how, watch);
@@ -845,6 +850,21 @@ impl<L: LightField> Solver<L> {
         }
     }
 
+    /// Finds out how much of what arrives leaves reflect beside the diffuse part where that travels as diffuse light. What is shot comes
+    /// piece by piece, which tells of none how it arrives all in all.
+    fn weigh_faint(&mut self) {
+        let grazing = if self.shot.is_some() { None } else { Grazing::new(&self.field, &self.faint) };
+        let Some(grazing) = grazing else { return };
+        let found = self.gather.grazing(self.light(), &self.links, &grazing);
+        self.faint_times.clear();
+        self.faint_times.resize(self.elements.nodes.len(), 1.0);
+        for (leaf, times) in found {
+            let element = &self.elements.nodes[leaf as usize];
+            let most = most_times(element.reflectance, self.faint[element.material as usize]);
+            self.faint_times[leaf as usize] = times.min(most);
+        }
+    }
+
     /// Diffuse radiosity of the leaves, averaged bottom-up with its range and direction.
     pub(crate) fn pull(&mut self) {
         let exitant = &mut self.exitant;
@@ -856,7 +876,8 @@ impl<L: LightField> Solver<L> {
             if element.child_count == 0 {
                 let material = &self.scene.materials[element.material as usize];
                 let emitted = if element.kind == Kind::Front { material.exitance } else { Rgb::ZERO };
-                let reflectance = element.reflectance + self.faint[element.material as usize];
+                let times = self.faint_times.get(node).copied().unwrap_or(1.0);
+                let reflectance = element.reflectance + self.faint[element.material as usize] * times;
                 let radiosity = emitted + exitant.irradiance[node] * reflectance;
                 exitant.radiosity[node] = radiosity;
                 exitant.directional[node] = exitant.irradiance[node] * self.strong[element.material as usize];
@@ -974,13 +995,13 @@ fn delta_share(now: Rgb, before: Rgb, dim: f32) -> f32 {
 }
 
 /// By material: what is reflected beside the diffuse part, as diffuse and as directional light.
-fn sorted<L: LightField>(field: &L, materials: usize, error: f32) -> (Vec<Rgb>, Vec<Rgb>) {
-    let sort = |material| match field.active(material) {
-        Some(albedo) if albedo.max_element() <= FAINT_SHARE * error => (albedo, Rgb::ZERO),
-        Some(albedo) => (Rgb::ZERO, albedo),
-        None => (Rgb::ZERO, Rgb::ZERO),
+fn sorted<L: LightField>(field: &L, materials: &[DiffuseMaterial], error: f32) -> (Vec<Rgb>, Vec<Rgb>) {
+    let sort = |(material, diffuse): (u32, &DiffuseMaterial)| {
+        let Some(albedo) = field.active(material) else { return (Rgb::ZERO, Rgb::ZERO) };
+        let most = error * (albedo + diffuse.reflectance).min_element().max(FAINT_SHARE);
+        if albedo.max_element() <= most { (albedo, Rgb::ZERO) } else { (Rgb::ZERO, albedo) }
     };
-    (0..materials as u32).map(sort).unzip()
+    (0..).zip(materials).map(sort).unzip()
 }
 
 /// Links are refined to a tolerance, and light settles over them.
