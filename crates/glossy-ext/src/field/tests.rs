@@ -1,5 +1,5 @@
 use super::*;
-use crate::reflector::{MetallicRoughness, Ward};
+use crate::reflector::{Lambert, MetallicRoughness, Ward};
 use glam::Vec2;
 
 /// A floor, lit from points at a distance of 10.
@@ -166,6 +166,23 @@ fn what_grazes_a_leaf_is_reflected() {
     let (found, albedo, mean, left) = reflected(0.9, 0.1);
     let most = left.max(MOST_GAIN * mean);
     assert!(albedo > 1.2 * most && found < 1.01 * most, "{found}, as no more than {most} is left of {albedo}");
+}
+
+/// What a host is told of how much is reflected from each direction has the mean that it is told; of a dielectric it is far from even.
+#[test]
+fn albedos_by_direction_have_their_mean() {
+    let dielectric = |base: f32| -> Arc<dyn Reflector> {
+        Arc::new(MetallicRoughness::new(Rgb::splat(base), 0.0, 0.2).expect("a dielectric"))
+    };
+    let field = GlossyField::new(&[dielectric(0.3)], Refinement::default());
+    let toward = |cosine: f32| field.directional_albedo(0, cosine).expect("it is glossy").x;
+    // ∫ a(μ) 2μ dμ by midpoints of μ².
+    let mean = (0..1000).map(|i| toward(((i as f32 + 0.5) / 1000.0).sqrt())).sum::<f32>() / 1000.0;
+    let active = field.active(0).expect("it is glossy").x;
+    assert!((mean / active - 1.0).abs() < 0.06, "{mean}, not {active}");
+    assert!(toward(1.0) < 0.6 * active && toward(0.1) > 3.0 * active, "{} and {}", toward(1.0), toward(0.1));
+    let diffuse: Arc<dyn Reflector> = Arc::new(Lambert::new(Rgb::splat(0.5)).expect("paint"));
+    assert_eq!(GlossyField::new(&[diffuse], Refinement::default()).directional_albedo(0, 0.5), None);
 }
 
 /// What is negligible by itself adds up where a distribution is coarse: its tails pay for that, not its highlight.

@@ -349,6 +349,10 @@ impl<L: LightField> LightField for Watched<L> {
         self.field.active(material)
     }
 
+    fn directional_albedo(&self, material: u32, cosine: f32) -> Option<Rgb> {
+        self.field.directional_albedo(material, cosine)
+    }
+
     fn lobe_width(&self, material: u32) -> Option<f32> {
         self.field.lobe_width(material)
     }
