@@ -482,20 +482,15 @@ impl Gather {
         links: &Links,
         grazing: &Grazing,
     ) -> Vec<(u32, f32)> {
-        let arriving = self.arriving.iter().map(|arriving| arriving.element_sum().max(0.0));
-        let weighed: Vec<Vec2> = links
-            .all()
-            .iter()
-            .zip(arriving)
-            .map(|(link, arriving)| {
-                let receiver = light.element(link.receiver);
-                let direction = light.direction_to(receiver.center, link.sender);
-                let knows = receiver.is_patch() && receiver.is_flat();
-                let times =
-                    if knows { grazing.times(receiver.material, direction.dot(receiver.normals.axis)) } else { 1.0 };
-                Vec2::new(arriving, arriving * times)
-            })
-            .collect();
+        let weighed = threads::map_range(0..links.all().len(), 256, |at| {
+            let (link, arriving) = (&links.all()[at], self.arriving[at].element_sum().max(0.0));
+            let receiver = light.element(link.receiver);
+            let direction = light.direction_to(receiver.center, link.sender);
+            let knows = receiver.is_patch() && receiver.is_flat();
+            let times =
+                if knows { grazing.times(receiver.material, direction.dot(receiver.normals.axis)) } else { 1.0 };
+            Vec2::new(arriving, arriving * times)
+        });
         let times = |sum: Vec2| if sum.x > 0.0 { (sum.y / sum.x).max(0.0) } else { 1.0 };
         self.on_leaves(light, links, &weighed).into_iter().map(|(leaf, sum)| (leaf, times(sum))).collect()
     }
