@@ -430,9 +430,12 @@ impl Vertices {
     }
 }
 
+/// Counters of [`Stats`].
+const COUNTERS: usize = 26;
+
 impl Stats {
     /// All counters, in the order in which they are kept.
-    fn counters(&mut self) -> [&mut u64; 25] {
+    fn counters(&mut self) -> [&mut u64; COUNTERS] {
         let Self {
             polygons,
             nodes,
@@ -443,8 +446,9 @@ impl Stats {
             vertex_rays,
             pairs,
             renewed_links,
-            renewed_places,
             kept_links,
+            renewed_places,
+            reined_leaves,
             iterations: _,
             links_evaluated,
             residuals: _,
@@ -483,8 +487,9 @@ impl Stats {
             vertex_rays,
             pairs,
             renewed_links,
-            renewed_places,
             kept_links,
+            renewed_places,
+            reined_leaves,
             links_evaluated,
             bytes,
             black_receivers,
@@ -518,7 +523,7 @@ impl Stats {
     fn restore(from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "statistics";
         let mut stats = Self::default();
-        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, 25>(WHAT)?) {
+        for (counter, kept) in stats.counters().into_iter().zip(from.take_exactly::<u64, COUNTERS>(WHAT)?) {
             *counter = kept;
         }
         let [iterations, stopped, spent] = from.take_exactly::<u64, 3>(WHAT)?;

@@ -529,7 +529,7 @@ impl<L: LightField> Solver<L> {
             };
             let Some(residual) = self.iterate(next, ask) else { break };
             (before, next) = (None, how);
-            if directional && iteration % 2 == 1 {
+            if directional {
                 let kept = self.kept();
                 self.feedback.rein_in(&self.exitant.irradiance, kept);
             }
@@ -540,6 +540,10 @@ impl<L: LightField> Solver<L> {
             if *stopped || settled || account.is_over() {
                 break;
             }
+        }
+        if directional {
+            let reined = self.elements.patch_leaves().filter(|&leaf| self.feedback.is_reined(leaf));
+            self.stats.reined_leaves = reined.count() as u64;
         }
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         self.finish_shooting(reflects, settled, before, &mut || {
@@ -845,6 +849,7 @@ impl<L: LightField> Solver<L> {
     fn push(&mut self) {
         for (leaf, irradiance) in self.gather.push(self.light(), &self.links) {
             // What inherited light tells of a single sender may be less than nothing.
+            let irradiance = irradiance * self.feedback.counts(leaf);
             let all = self.shot.as_mut().map_or(irradiance.max(Rgb::ZERO), |shot| shot.receive(leaf, irradiance));
             self.exitant.irradiance[leaf as usize] = all;
         }

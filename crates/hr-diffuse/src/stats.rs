@@ -24,10 +24,13 @@ pub struct Stats {
     pub pairs: u64,
     /// Of the last edit of places: links that it concerned, which were made anew, …
     pub renewed_links: u64,
-    /// Places that found out anew how light reaches them, as it comes from other parts of senders than it did.
-    pub renewed_places: u64,
     /// … and those that stayed.
     pub kept_links: u64,
+    /// Places that found out anew how light reaches them, as it comes from other parts of senders than it did.
+    pub renewed_places: u64,
+    /// Leaves whose directional light would not have died out, as more came back than they sent: what they send, or what arrives there, was
+    /// cut down until it did.
+    pub reined_leaves: u64,
     /// Iterations (gather, push, reflect, pull).
     pub iterations: u32,
     /// Links that light was sent over, each counted in every iteration that did so.

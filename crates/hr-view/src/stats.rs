@@ -52,6 +52,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times, spared: Spared)
             "links": stats.links,
             "links_evaluated": stats.links_evaluated,
             "renewed_places": stats.renewed_places,
+            "reined_leaves": stats.reined_leaves,
             "rays": stats.rays + stats.check_rays + stats.vertex_rays,
             "check_rays": stats.check_rays,
             "vertex_rays": stats.vertex_rays,
