@@ -4,13 +4,26 @@
 //! several times its mean of what grazes it, as on a ceiling above a cove. Links know where from, so each leaf reflects as much as it
 //! should, though not to where.
 
-use crate::Rgb;
 use crate::hooks::LightField;
+use crate::{DiffuseMaterial, Rgb};
 
+/// Materials that reflect no more than this share of the error asked for beside their diffuse part have it carried as
+/// diffuse light until it is shown; and bright ones, no more than the error times all that they reflect: most of their light is diffuse anyhow.
+const FAINT_SHARE: f32 = 0.7;
 /// Cosines of the table: squares of equal steps, as albedos change fastest toward the horizon.
 const STEPS: usize = 16;
 /// With what is grazing a leaf reflects no more than this of all that arrives, or no more than on average: so light dies out.
 const MOST: f32 = 0.98;
+
+/// By material: what is reflected beside the diffuse part, as diffuse and as directional light.
+pub(crate) fn sorted<L: LightField>(field: &L, materials: &[DiffuseMaterial], error: f32) -> (Vec<Rgb>, Vec<Rgb>) {
+    let sort = |(material, diffuse): (u32, &DiffuseMaterial)| {
+        let Some(albedo) = field.active(material) else { return (Rgb::ZERO, Rgb::ZERO) };
+        let most = error * (albedo + diffuse.reflectance).min_element().max(FAINT_SHARE);
+        if albedo.max_element() <= most { (albedo, Rgb::ZERO) } else { (Rgb::ZERO, albedo) }
+    };
+    (0..).zip(materials).map(sort).unzip()
+}
 
 /// By material, how many times its mean is reflected of light from a direction, by its cosine.
 #[derive(Debug)]
