@@ -41,6 +41,14 @@ pub enum SceneError {
         /// The names of the built-in scenes.
         known: String,
     },
+    /// No surface has a material of this name.
+    #[error("no surface has a material '{name}'; materials: {known}")]
+    NoMaterial {
+        /// What was asked for.
+        name: String,
+        /// Names of those that surfaces have.
+        known: String,
+    },
 }
 
 impl SceneError {

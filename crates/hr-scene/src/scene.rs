@@ -46,6 +46,9 @@ pub struct Warning {
     pub count: u32,
 }
 
+/// So many names of materials are told where there is none of a name.
+const MOST_NAMES: usize = 12;
+
 /// A scene, ready for the solver and for the eye.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
@@ -89,6 +92,46 @@ impl Scene {
         scene.finish()
     }
 
+    /// Leaves out the surfaces of all materials of this name, as if they were not there: the panes of windows, for light to come in, or what
+    /// only stands for something that is cut out of it.
+    ///
+    /// # Errors
+    /// [`SceneError::NoMaterial`] where no surface has such a material, [`SceneError::Empty`] where no other is left.
+    pub fn leave_out(&mut self, material: &str) -> Result<(), SceneError> {
+        let stays: Vec<bool> =
+            self.surfaces.iter().map(|s| self.materials[s.material as usize].name != material).collect();
+        if stays.iter().all(|stays| *stays) {
+            let mut known: Vec<&str> =
+                self.surfaces.iter().map(|s| self.materials[s.material as usize].name.as_str()).collect();
+            known.sort_unstable();
+            known.dedup();
+            let more = known.len().saturating_sub(MOST_NAMES);
+            known.truncate(MOST_NAMES);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let known = format!("'{}'{more}", known.join("', '"));
+            return Err(SceneError::NoMaterial { name: material.to_owned(), known });
+        }
+        if stays.iter().all(|stays| !*stays) {
+            return Err(SceneError::empty(format!("{} without '{material}'", self.name), &self.warnings));
+        }
+        let mut count = 0;
+        let indices: Vec<Option<u32>> = stays
+            .iter()
+            .map(|stays| {
+                count += u32::from(*stays);
+                stays.then(|| count - 1)
+            })
+            .collect();
+        let mut stays = stays.into_iter();
+        self.surfaces.retain(|_| stays.next() == Some(true));
+        self.attributes.retain_mut(|attributes| {
+            let index = indices[attributes.surface as usize];
+            attributes.surface = index.unwrap_or_default();
+            index.is_some()
+        });
+        Ok(())
+    }
+
     /// What the diffuse engine needs of this scene: its surfaces and lights, of each material the Lambertian share,
     /// and where base colours vary over surfaces their mean over any part of one.
     #[must_use]
@@ -129,6 +172,39 @@ impl SurfaceReflectance for Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_left_out_is_not_there() {
+        let mut scene = Scene::load("cornell").expect("built in");
+        let before = scene.surfaces.clone();
+        let name = |scene: &Scene, index: usize| scene.materials[before[index].material as usize].name.clone();
+        let gone = name(&scene, 0);
+        scene.attributes = (0..before.len() as u32)
+            .map(|surface| SurfaceAttributes { surface, uv: [Vec2::splat(surface as f32); 4], color: [Rgb::ONE; 4] })
+            .collect();
+        let stays: Vec<usize> = (0..before.len()).filter(|&index| name(&scene, index) != gone).collect();
+        assert!(!stays.is_empty() && stays.len() < before.len(), "some are left out: {gone}");
+        scene.leave_out(&gone).expect("there are others");
+        assert_eq!(scene.surfaces, stays.iter().map(|&index| before[index].clone()).collect::<Vec<_>>());
+        for (surface, (attributes, was)) in scene.attributes.iter().zip(stays).enumerate() {
+            assert_eq!((attributes.surface as usize, attributes.uv[0].x), (surface, was as f32), "attributes go along");
+        }
+        let error = scene.leave_out(&gone).expect_err("it is gone").to_string();
+        assert!(
+            error.contains(&gone) && error.contains(&scene.materials[scene.surfaces[0].material as usize].name),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn something_stays() {
+        let mut scene = Scene::load("cornell").expect("built in");
+        scene.materials.iter_mut().for_each(|material| material.name = "all".into());
+        let count = scene.surfaces.len();
+        let error = scene.leave_out("all").expect_err("nothing would be left");
+        assert!(matches!(error, SceneError::Empty { .. }) && error.to_string().contains("without 'all'"), "{error}");
+        assert_eq!(scene.surfaces.len(), count, "nothing is lost");
+    }
 
     #[test]
     fn unknown_names_list_the_known_ones() {

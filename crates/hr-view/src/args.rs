@@ -26,6 +26,10 @@ pub struct Args {
     #[arg(long, value_name = "FILE.json", help = CAMERA_HELP)]
     pub camera: Option<PathBuf>,
 
+    /// Leave out all surfaces of a material, as if they were not there, such as the glass of windows; more than once for several
+    #[arg(long, value_name = "MATERIAL")]
+    pub leave_out: Vec<String>,
+
     /// No window: one image; .pfm and .exr hold linear radiance, unclamped, .png is tone-mapped
     #[arg(long, value_name = "OUT")]
     pub image: Option<PathBuf>,
@@ -199,6 +203,7 @@ mod tests {
         assert_eq!(run("room --load s.hrs --threads 2").load, Some("s.hrs".into()), "load");
         assert_eq!(run("--export light.glb").export, Some("light.glb".into()), "export");
         assert_eq!(run("--frames out --path p.json").path, Some("p.json".into()), "path");
+        assert_eq!(run("--leave-out glass --leave-out leaves").leave_out, ["glass", "leaves"], "several");
         assert_eq!(run("--frames out").frames, Some("out".into()), "frames");
     }
 

@@ -22,6 +22,9 @@ pub(crate) fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewE
     if let Some(more) = scene.warnings.len().checked_sub(MOST_WARNINGS).filter(|more| *more > 0) {
         progress.say(&format!("warning: {more} more kinds of warnings"));
     }
+    for material in &args.leave_out {
+        scene.leave_out(material)?;
+    }
     if is_dark(&scene) {
         progress.say(
             "warning: nothing in the scene shines, all will be black; give a material emission or add a light, such as one of \

@@ -120,12 +120,17 @@ impl Materials {
         }
         match source.alpha_mode {
             Checked::Valid(AlphaMode::Mask) => {
-                not_simulated.push("alphaMode MASK is taken as opaque");
+                not_simulated
+                    .push("alphaMode MASK is taken as opaque; leave the material out if it hides what it should not");
             }
             Checked::Valid(AlphaMode::Blend) => {
-                not_simulated.push("alphaMode BLEND is taken as opaque");
+                not_simulated.push("alphaMode BLEND is taken as opaque; leave the material out for light to pass");
             }
             _ => {}
+        }
+        let transmission = source.extensions.as_ref().and_then(|e| e.transmission.as_ref());
+        if transmission.is_some_and(|t| t.transmission_factor.0 > 0.0) {
+            not_simulated.push("transmission is taken as opaque; leave the material out for light to pass");
         }
         if source.double_sided && radiance != Rgb::ZERO {
             not_simulated.push("a doubleSided emitter emits from its front only");

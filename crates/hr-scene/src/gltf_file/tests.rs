@@ -503,7 +503,8 @@ fn what_is_not_simulated_is_said_once() {
         json!([{"name": "all",
         "pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}},
         "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0},
-        "normalTexture": {"index": 0}, "occlusionTexture": {"index": 0}, "alphaMode": "BLEND"}]),
+        "normalTexture": {"index": 0}, "occlusionTexture": {"index": 0}, "alphaMode": "BLEND",
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.9}}}]),
     );
     b.mesh(&json!({"attributes": {"POSITION": 0, "TEXCOORD_0": uv}, "indices": 1, "material": 0}));
     b.set("nodes", json!([{"mesh": 0}, {"mesh": 0, "translation": [0, 0, 1]}]));
@@ -512,7 +513,7 @@ fn what_is_not_simulated_is_said_once() {
     assert!(warned(&scene, "KHR_materials_clearcoat"), "the extension");
     let about: Vec<_> = scene.warnings.iter().filter(|w| w.text.contains("'all'")).collect();
     assert_eq!(about.len(), 1, "one warning per material: {:?}", scene.warnings);
-    for what in ["metallic-roughness", "emissive", "normal", "occlusion", "BLEND"] {
+    for what in ["metallic-roughness", "emissive", "normal", "occlusion", "BLEND", "transmission"] {
         assert!(about[0].text.contains(what), "{what} in {}", about[0].text);
     }
     assert_eq!((about[0].count, about[0].first.as_str()), (1, "materials[0]"), "once, and where");
