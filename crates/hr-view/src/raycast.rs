@@ -26,6 +26,8 @@ use sight::Sight;
 
 /// Rays that follow a lobe, per ray of the pixel.
 const LOBE_RAYS: usize = 6;
+/// Diffuse light takes as long as so many of them.
+const DIFFUSE_RAYS: f32 = 3.0;
 /// Mirrors in mirrors end here.
 const MOST_BOUNCES: u32 = 4;
 /// Where surfaces that meet in a pixel differ by c times its mean, a grid of n × n rays knows that mean to about 0.3 c / n^1.5. So
@@ -126,14 +128,57 @@ impl Met {
 }
 
 /// What the rays of a pixel have in common.
-#[derive(Default)]
 struct Shared {
+    /// Rays that follow a lobe, for each of them.
+    lobe_rays: usize,
+    /// How noisy diffuse light is, and what is found along rays that follow a lobe.
+    noise: [Spread; 2],
     /// Saves allocations.
     incident: Vec<Incident>,
     /// The ray through its middle, from the eye in unit space.
     ray: (Vec3, Vec3),
     /// What is seen there, once it is asked for.
     middle: Option<Option<Shaded>>,
+}
+
+impl Default for Shared {
+    fn default() -> Self {
+        Self {
+            lobe_rays: LOBE_RAYS,
+            noise: [Spread::default(); 2],
+            incident: Vec::new(),
+            ray: Default::default(),
+            middle: None,
+        }
+    }
+}
+
+/// Sums over some numbers.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spread {
+    count: f32,
+    sum: f32,
+    squares: f32,
+}
+
+impl Spread {
+    fn add(&mut self, number: f32) {
+        self.count += 1.0;
+        self.sum += number;
+        self.squares += number * number;
+    }
+
+    fn variance(&self) -> f32 {
+        let mean = self.sum / self.count.max(1.0);
+        (self.squares / self.count.max(1.0) - mean * mean).max(0.0)
+    }
+}
+
+/// How many rays are to follow a lobe for each ray of a pixel, where `LOBE_RAYS` of them have the second of two variances and diffuse light the
+/// first: what makes the least noise in the same time.
+fn lobe_rays([diffuse, lobe]: [f32; 2]) -> usize {
+    let best = (LOBE_RAYS as f32 * DIFFUSE_RAYS * lobe / diffuse.max(f32::MIN_POSITIVE)).sqrt();
+    if lobe > 0.0 && best.is_finite() { best.round().clamp(1.0, LOBE_RAYS as f32) as usize } else { LOBE_RAYS }
 }
 
 /// Glossy light toward a pixel of samples that arrive.
@@ -378,7 +423,11 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let mut pixel = Pixel::default();
         shared.ray = sight.ray([x, y], Vec2::splat(0.5));
         shared.middle = None;
+        (shared.lobe_rays, shared.noise) = (LOBE_RAYS, [Spread::default(); 2]);
         for i in 0..all * (1 + rounds) {
+            if i == all {
+                shared.lobe_rays = lobe_rays(shared.noise.map(|of| of.variance()));
+            }
             let sampler = Sampler::new(seed, i);
             let within = if i < all { stratified(self.grid, i, seed) } else { sampler.pair(0) };
             let (_, direction) = sight.ray([x, y], within);
@@ -451,6 +500,9 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             .unwrap_or_else(|| Arc::clone(&material.reflector));
         let irradiance = self.irradiance(&hit, leaf, direction, bounce, sampler);
         let diffuse = reflector.diffuse() * irradiance * FRAC_1_PI;
+        if bounce == 0 {
+            shared.noise[0].add(diffuse.element_sum());
+        }
         if reflector.is_diffuse() {
             return diffuse;
         }
@@ -550,7 +602,11 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             return light;
         }
         if self.lobe(met).is_none() {
-            let turns: [Vec2; LOBE_RAYS] = std::array::from_fn(|k| sampler.split(LOBE_RAYS as u32, k as u32).pair(1));
+            let count = shared.lobe_rays;
+            // Fewer are spread evenly among themselves, not among those that went before.
+            let dimension = if count == LOBE_RAYS { 1 } else { 6 };
+            let turns: [Vec2; LOBE_RAYS] =
+                std::array::from_fn(|k| sampler.split(count as u32, k as u32).pair(dimension));
             let pairs = [2, 3].map(|dimension| sampler.pair(dimension));
             let mut number = 0;
             let mut beyond = |hit: &Hit, direction| {
@@ -558,7 +614,11 @@ impl<'a, B: Basis> RayCaster<'a, B> {
                 let Some(leaf) = self.solution.leaf(hit) else { return Rgb::ZERO };
                 self.leaving(*hit, leaf, direction, bounce + 1, &sampler.apart(number), shared)
             };
-            return light + self.tracer.glossy(&met.hit, -met.away, pairs, &turns, &mut beyond);
+            let followed = self.tracer.glossy(&met.hit, -met.away, pairs, &turns[..count], &mut beyond);
+            if bounce == 0 {
+                shared.noise[1].add(followed.element_sum());
+            }
+            return light + followed;
         }
         light + if bounce == 0 { self.shared(met, shared) } else { self.by_samples(met, shared) }
     }
@@ -777,6 +837,20 @@ mod tests {
     }
 
     /// Where emitters are partly hidden all over a leaf, vertices know their light as well as rays of pixels do, and without noise.
+    /// Where diffuse light is what is noisy, in half shadow, few rays follow a lobe, and never none.
+    #[test]
+    fn rays_go_where_the_noise_is() {
+        for (diffuse, lobe, expected) in
+            [(1.0, 0.01, 1), (1.0, 1.0, 4), (0.0, 1.0, LOBE_RAYS), (1.0, 0.0, LOBE_RAYS), (f32::NAN, 1.0, LOBE_RAYS)]
+        {
+            assert_eq!(lobe_rays([diffuse, lobe]), expected, "variances {diffuse} and {lobe}");
+        }
+        let mut spread = Spread::default();
+        assert_eq!(spread.variance(), 0.0, "of nothing");
+        [1.0, 3.0].into_iter().for_each(|number| spread.add(number));
+        assert_eq!(spread.variance(), 1.0);
+    }
+
     #[test]
     fn half_shadow_is_as_bright_from_vertices_as_from_rays() {
         let (scene, camera) = below_slats();
