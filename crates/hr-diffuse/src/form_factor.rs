@@ -42,7 +42,7 @@ pub fn point_to_polygon(x: Vec3, n: Vec3, corners: &[Vec3]) -> f32 {
 }
 
 /// [`point_to_polygon`] for corners relative to the point.
-fn lambert(n: DVec3, corners: impl ExactSizeIterator<Item = DVec3> + Clone) -> f64 {
+pub(crate) fn lambert(n: DVec3, corners: impl ExactSizeIterator<Item = DVec3> + Clone) -> f64 {
     let mut contour = Contour::new(n);
     if let Some(last) = corners.clone().last() {
         corners.fold(last, |from, to| {
@@ -349,7 +349,7 @@ pub fn part_factor(receiver: Part<'_>, sender: Part<'_>, accuracy: Accuracy) -> 
 }
 
 /// Corners of a part of a polygon, counter-clockwise around its normal, which is returned, too.
-fn outline(part: Part<'_>) -> (SmallVec<[DVec3; 5]>, DVec3) {
+pub(crate) fn outline(part: Part<'_>) -> (SmallVec<[DVec3; 5]>, DVec3) {
     let normal = part.place(part.geometry.middle(part.domain).as_dvec2()).1;
     let mut corners: SmallVec<[DVec3; 5]> =
         part.geometry.corners(part.domain).iter().map(|uv| part.place(uv.as_dvec2()).0).collect();
@@ -360,7 +360,7 @@ fn outline(part: Part<'_>) -> (SmallVec<[DVec3; 5]>, DVec3) {
 }
 
 /// What of a convex polygon is in front of a plane.
-fn in_front(polygon: &[DVec3], on_plane: DVec3, normal: DVec3) -> SmallVec<[DVec3; 5]> {
+pub(crate) fn in_front(polygon: &[DVec3], on_plane: DVec3, normal: DVec3) -> SmallVec<[DVec3; 5]> {
     let mut front: SmallVec<[DVec3; 5]> = SmallVec::new();
     for (i, &to) in polygon.iter().enumerate() {
         let from = polygon[(i + polygon.len() - 1) % polygon.len()];

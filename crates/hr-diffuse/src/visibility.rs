@@ -573,9 +573,11 @@ impl Groups {
 mod beam;
 mod eight;
 mod keep;
+mod occluders;
 mod shaft;
 #[cfg(test)]
 mod tests;
 
 pub use beam::Beam;
+pub use occluders::{Occluders, Patch};
 pub(crate) use shaft::{End, MOST_LISTED, Proof, Shaft};

@@ -20,14 +20,14 @@ mod spherical;
 mod tests;
 
 pub use emitters::{Arrival, Draws, Emitters, Glow};
-pub use nearby::{Nearby, Place};
+pub use nearby::Nearby;
 pub use sampler::Sampler;
 
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::{Place as Frame, Reflector};
 use groups::MOST_GROUPS;
 use hr_diffuse::sampling::hash;
-use hr_diffuse::visibility::NO_BLOCKER;
+use hr_diffuse::visibility::{NO_BLOCKER, Occluders};
 use hr_diffuse::{Geometry, Hit, Normalization, Rgb, SolveError, Visibility};
 use hr_scene::{Camera, Film, Image, Pixel, Scene};
 use rayon::prelude::*;
@@ -152,6 +152,8 @@ struct Point {
     chances: [f32; 3],
     /// Glossy albedo.
     albedo: f32,
+    /// How many rays follow the glossy part for each draw of an emitter.
+    rays: f32,
 }
 
 /// Where a path goes on.
@@ -338,7 +340,7 @@ impl<'a> PathTracer<'a> {
         beyond: &mut dyn FnMut(&Hit, Vec3) -> Rgb,
     ) -> Rgb {
         let Some(point) = self.point(hit, direction) else { return Rgb::ZERO };
-        let point = Point { diffuse: Rgb::ZERO, chances: [0.0, 1.0, 0.0], ..point };
+        let point = Point { diffuse: Rgb::ZERO, chances: [0.0, 1.0, 0.0], rays: turns.len() as f32, ..point };
         let mut light = self.direct_of_groups(&point, choice, place);
         for turn in turns {
             let Some(step) = point.step(0.0, *turn) else { continue };
@@ -351,7 +353,17 @@ impl<'a> PathTracer<'a> {
         light
     }
 
-    /// Irradiance (W/m²) by emitters where a surface was hit by a ray of the unit `direction`, from one point of one of them, or from a few where it
+    /// Irradiance (W/m²) by emitters of which all is known that may hide parts of them from there, where a surface was hit by a ray of the
+    /// unit `direction`: exact, and without a ray.
+    pub fn outlined(&self, hit: &Hit, direction: Vec3, nearby: &Nearby) -> Rgb {
+        let Some(point) = self.point(hit, direction) else { return Rgb::ZERO };
+        let normals = [point.place.frame.z_axis, point.true_normal];
+        let visible =
+            |(entry, occluders): &(u32, Occluders)| self.emitters.visible(*entry, occluders, point.position, normals);
+        nearby.all_outlined().iter().map(visible).sum()
+    }
+
+    /// Irradiance (W/m²) by the other emitters where a surface was hit by a ray of the unit `direction`, from one point of one of them, or from a few where it
     /// is believed to lie in half shadow, by what is known of those `nearby`; else from a few of the groups of neighbours.
     ///
     /// Of emitters of which a share s is believed to be seen, that share of all their light u, were nothing between, is known without
@@ -382,7 +394,9 @@ impl<'a> PathTracer<'a> {
             let sampler = sampler.split(count, draw);
             let [choice, place] = IRRADIANCE_PAIRS.map(|dimension| sampler.pair(dimension));
             let drawn = self.emitters.draw(geometries, point.position, choice.x, place, Some(nearby));
-            let Some(arrival) = drawn.filter(|arrival| point.is_lit_from(arrival.direction)) else { continue };
+            let is_lacking =
+                |arrival: &Arrival| point.is_lit_from(arrival.direction) && !nearby.is_outlined(arrival.entry);
+            let Some(arrival) = drawn.filter(is_lacking) else { continue };
             let believed =
                 expected.iter().find(|(entry, ..)| *entry == arrival.entry).map_or(0.0, |(_, seen, _)| *seen);
             let ends = [point.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
@@ -442,6 +456,7 @@ impl<'a> PathTracer<'a> {
             diffuse,
             chances: chances.map(|chance| chance / total),
             albedo,
+            rays: 1.0,
         })
     }
 
@@ -578,7 +593,7 @@ impl Point {
 
     /// Of a direction for which the glossy part of the BRDF is `glossy`.
     fn glossy_density(&self, glossy: Rgb, incident: Vec3) -> f32 {
-        self.chances[1] * glossy.abs().max_element() * incident.z / self.albedo
+        self.rays * self.chances[1] * glossy.abs().max_element() * incident.z / self.albedo
     }
 }
 

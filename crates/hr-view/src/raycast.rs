@@ -6,28 +6,28 @@
 //! a [path tracer](crate::path_tracer) end where they meet the solution, whose elements and mistakes are then seen blurred.
 
 use crate::glossy::{self, Mode, NARROWEST};
-use crate::path_tracer::{Glow, Known, Nearby, PathTracer, Place as Lit, Ray, Sampler};
+use crate::path_tracer::{Glow, Known, Nearby, PathTracer, Ray, Sampler};
 use glam::{DVec3, Vec2, Vec3};
 use glossy_ext::haar::Haar;
-use glossy_ext::{Basis, GlossyField, Incident, Lobe, Place, Reflector};
+use glossy_ext::{Basis, GlossyField, Lobe, Place, Reflector};
 use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2};
+use hr_diffuse::visibility::Patch;
 use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
 use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
 use rayon::prelude::*;
+use smallvec::SmallVec;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
+mod shared;
 mod sight;
 
+use shared::{CORNERS, FIRST_LOBE_RAYS, LOBE_RAYS, Shaded, Shared, corners_first};
 use sight::Sight;
 
-/// Rays that follow a lobe, per ray of the pixel.
-const LOBE_RAYS: usize = 6;
-/// Diffuse light takes as long as so many of them.
-const DIFFUSE_RAYS: f32 = 3.0;
 /// Mirrors in mirrors end here.
 const MOST_BOUNCES: u32 = 4;
 /// Where surfaces that meet in a pixel differ by c times its mean, a grid of n × n rays knows that mean to about 0.3 c / n^1.5. So
@@ -89,6 +89,7 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     even: AtomicU64,
     smooth: AtomicU64,
     half_shadows: AtomicU64,
+    exact_shadows: AtomicU64,
 }
 
 /// What pixels were spared: most of those that see one polygon need fewer rays.
@@ -100,6 +101,9 @@ pub struct Spared {
     pub smooth_pixels: u64,
     /// Rays of pixels that met a leaf in even half shadow, where none were sent to emitters.
     pub half_shadows: u64,
+    /// Rays of pixels that met a place where all is known that may hide emitters: what is seen of these was cut out, and no ray sent to
+    /// them.
+    pub exact_shadows: u64,
 }
 
 /// What is known of the emitters that light a leaf.
@@ -125,72 +129,6 @@ impl Met {
     fn place(&self) -> Place {
         Place::along(self.hit.point, self.normal, self.reflector.grain())
     }
-}
-
-/// What the rays of a pixel have in common.
-struct Shared {
-    /// Rays that follow a lobe, for each of them.
-    lobe_rays: usize,
-    /// How noisy diffuse light is, and what is found along rays that follow a lobe.
-    noise: [Spread; 2],
-    /// Saves allocations.
-    incident: Vec<Incident>,
-    /// The ray through its middle, from the eye in unit space.
-    ray: (Vec3, Vec3),
-    /// What is seen there, once it is asked for.
-    middle: Option<Option<Shaded>>,
-}
-
-impl Default for Shared {
-    fn default() -> Self {
-        Self {
-            lobe_rays: LOBE_RAYS,
-            noise: [Spread::default(); 2],
-            incident: Vec::new(),
-            ray: Default::default(),
-            middle: None,
-        }
-    }
-}
-
-/// Sums over some numbers.
-#[derive(Clone, Copy, Debug, Default)]
-struct Spread {
-    count: f32,
-    sum: f32,
-    squares: f32,
-}
-
-impl Spread {
-    fn add(&mut self, number: f32) {
-        self.count += 1.0;
-        self.sum += number;
-        self.squares += number * number;
-    }
-
-    fn variance(&self) -> f32 {
-        let mean = self.sum / self.count.max(1.0);
-        (self.squares / self.count.max(1.0) - mean * mean).max(0.0)
-    }
-}
-
-/// How many rays are to follow a lobe for each ray of a pixel, where `LOBE_RAYS` of them have the second of two variances and diffuse light the
-/// first: what makes the least noise in the same time.
-fn lobe_rays([diffuse, lobe]: [f32; 2]) -> usize {
-    let best = (LOBE_RAYS as f32 * DIFFUSE_RAYS * lobe / diffuse.max(f32::MIN_POSITIVE)).sqrt();
-    if lobe > 0.0 && best.is_finite() { best.round().clamp(1.0, LOBE_RAYS as f32) as usize } else { LOBE_RAYS }
-}
-
-/// Glossy light toward a pixel of samples that arrive.
-struct Shaded {
-    /// The [face cluster](hr_diffuse::face_clusters) that they arrive at.
-    cluster: u32,
-    at: Vec3,
-    /// Unit direction of what is seen mirrored.
-    seen: Vec3,
-    /// Of the lobe.
-    width: f32,
-    light: Rgb,
 }
 
 /// The pixels around one, itself included, that lie in some rows.
@@ -252,6 +190,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             even: AtomicU64::new(0),
             smooth: AtomicU64::new(0),
             half_shadows: AtomicU64::new(0),
+            exact_shadows: AtomicU64::new(0),
         }
     }
 
@@ -286,9 +225,10 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// What the pixels of all pictures so far did without.
     #[must_use]
     pub fn spared(&self) -> Spared {
-        let [even_pixels, smooth_pixels, half_shadows] =
-            [&self.even, &self.smooth, &self.half_shadows].map(|count| count.load(Ordering::Relaxed));
-        Spared { even_pixels, smooth_pixels, half_shadows }
+        let counts = [&self.even, &self.smooth, &self.half_shadows, &self.exact_shadows];
+        let [even_pixels, smooth_pixels, half_shadows, exact_shadows] =
+            counts.map(|count| count.load(Ordering::Relaxed));
+        Spared { even_pixels, smooth_pixels, half_shadows, exact_shadows }
     }
 
     /// To be printed or not: rays by which a print has less noise do not enter the image.
@@ -385,6 +325,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// them has one.
     fn cover(&self, sight: &Sight<'_>, [x, y]: [usize; 2], wanted: Wanted, pixel: &mut Pixel, shared: &mut Shared) {
         let (seed, side) = (hash(x as u32, y as u32 ^ 0x91e7), u32::from(wanted.side));
+        shared.outlined = Default::default();
         let is_first = |i: &u32| ((i / side) | (i % side)).is_multiple_of(2);
         let all = 0..side * side;
         let firsts = side.div_ceil(2).pow(2) as usize;
@@ -402,7 +343,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
 
     /// What is seen in the middle of a pixel that stands for all of it, as it sees one polygon only and light that is known without noise.
     fn glance(&self, sight: &Sight<'_>, pixel: [usize; 2], shared: &mut Shared) -> Option<Pixel> {
-        if self.mode != Mode::Distributions || !sight.is_even(pixel) {
+        if !sight.is_even(pixel) {
             return None;
         }
         let (_, direction) = sight.ray(pixel, Vec2::splat(0.5));
@@ -410,26 +351,43 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         if first.is_some_and(|(surface, _)| self.scene.base_color(surface, 0.0, 0.0).is_some()) {
             return None;
         }
+        if first.is_some_and(|first| !self.is_without_noise(&sight.hit(first, direction))) {
+            return None;
+        }
         // The middle of the pixel is this ray's own.
-        shared.middle = Some(None);
+        (shared.middle, shared.outlined) = (Some(None), Default::default());
         let mut seen = Pixel::default();
         self.add_to(&mut seen, (sight, first), direction, &Sampler::new(0, 0), shared);
         Some(seen)
+    }
+
+    /// Whether what is seen at once of a surface where it was hit is known without chance.
+    fn is_without_noise(&self, hit: &Hit) -> bool {
+        match self.mode {
+            Mode::Distributions => true,
+            Mode::Gather => false,
+            Mode::Samples => {
+                let is_known = |leaf| self.knows_emitters(leaf).is_some_and(|lights| lights.nearby.is_all_outlined());
+                self.material(hit).reflector.is_diffuse() && self.solution.leaf(hit).is_none_or(is_known)
+            }
+        }
     }
 
     /// What is seen in a pixel with some rounds of rays more than all have.
     fn pixel(&self, sight: &Sight<'_>, [x, y]: [usize; 2], rounds: u32, shared: &mut Shared) -> Pixel {
         let (all, seed) = (self.grid * self.grid, hash(x as u32, y as u32 ^ 0x6b43));
         let mut pixel = Pixel::default();
-        shared.ray = sight.ray([x, y], Vec2::splat(0.5));
-        shared.middle = None;
-        (shared.lobe_rays, shared.noise) = (LOBE_RAYS, [Spread::default(); 2]);
+        shared.begin(sight.ray([x, y], Vec2::splat(0.5)));
+        let cells = corners_first(self.grid).map(|cell| stratified(self.grid, cell, seed));
+        let mut cells = cells.collect::<SmallVec<[Vec2; 9]>>().into_iter();
         for i in 0..all * (1 + rounds) {
-            if i == all {
-                shared.lobe_rays = lobe_rays(shared.noise.map(|of| of.variance()));
+            if i == CORNERS && i < all {
+                shared.judge_corners(all - CORNERS);
+            } else if i == all {
+                shared.judge();
             }
             let sampler = Sampler::new(seed, i);
-            let within = if i < all { stratified(self.grid, i, seed) } else { sampler.pair(0) };
+            let within = cells.next().unwrap_or_else(|| sampler.pair(0));
             let (_, direction) = sight.ray([x, y], within);
             self.add_to(&mut pixel, (sight, sight.first([x, y], direction)), direction, &sampler, shared);
         }
@@ -498,10 +456,10 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let reflector = base_color
             .and_then(|color| material.reflector.with_base_color(color))
             .unwrap_or_else(|| Arc::clone(&material.reflector));
-        let irradiance = self.irradiance(&hit, leaf, direction, bounce, sampler);
+        let irradiance = self.irradiance(&hit, leaf, direction, bounce, sampler, shared);
         let diffuse = reflector.diffuse() * irradiance * FRAC_1_PI;
         if bounce == 0 {
-            shared.noise[0].add(diffuse.element_sum());
+            shared.noise[0].add(diffuse.element_sum(), 1);
         }
         if reflector.is_diffuse() {
             return diffuse;
@@ -530,34 +488,63 @@ impl<'a, B: Basis> RayCaster<'a, B> {
 
     /// Irradiance where a leaf was hit: that at vertices; what is seen at once has in [`Mode::Samples`] the emitters' own light from
     /// rays to them, as shadows may be finer than vertices tell.
-    fn irradiance(&self, hit: &Hit, leaf: NodeId, direction: Vec3, bounce: u32, sampler: &Sampler) -> Rgb {
+    fn irradiance(
+        &self,
+        hit: &Hit,
+        leaf: NodeId,
+        direction: Vec3,
+        bounce: u32,
+        sampler: &Sampler,
+        shared: &mut Shared,
+    ) -> Rgb {
         if self.mode != Mode::Samples || bounce > 0 || self.followed <= 0.0 {
             return self.solution.irradiance(leaf, hit.uv);
         }
-        let lights = if self.tracer.emitters().len() <= MOST_NEARBY { self.lights(leaf) } else { None };
+        let lights = self.knows_emitters(leaf);
         if lights.is_some_and(|lights| lights.are_even) {
             self.half_shadows.fetch_add(1, Ordering::Relaxed);
             return self.solution.irradiance(leaf, hit.uv);
         }
-        let nearby = lights.map(|lights| &lights.nearby);
-        let direct = self.tracer.irradiance(hit, direction.normalize(), sampler, nearby);
-        self.solution.indirect_irradiance(leaf, hit.uv) + direct
+        let (nearby, direction) = (lights.map(|lights| &lights.nearby), direction.normalize());
+        let outlined = nearby.filter(|nearby| !nearby.all_outlined().is_empty()).map(|nearby| {
+            shared.outlined.even(hit).unwrap_or_else(|| {
+                let light = self.tracer.outlined(hit, direction, nearby);
+                shared.outlined.add(hit, light);
+                light
+            })
+        });
+        let known = self.solution.indirect_irradiance(leaf, hit.uv) + outlined.unwrap_or(Rgb::ZERO);
+        if nearby.is_some_and(Nearby::is_all_outlined) {
+            self.exact_shadows.fetch_add(1, Ordering::Relaxed);
+            return known;
+        }
+        known + self.tracer.irradiance(hit, direction, sampler, nearby)
+    }
+
+    /// What is known of the emitters that light a leaf, where they are so few that it pays to know.
+    fn knows_emitters(&self, leaf: NodeId) -> Option<&Lights> {
+        if self.tracer.emitters().len() <= MOST_NEARBY { self.lights(leaf) } else { None }
     }
 
     /// What is known of the emitters that light a leaf, found out where it is asked for.
     fn lights(&self, leaf: NodeId) -> Option<&Lights> {
         let lights = self.lights.get(leaf.index())?.get_or_init(|| {
             let element = &self.solution.elements.nodes[leaf.index()];
-            let place = Lit { surface: element.source, domain: element.domain, back: element.kind == Kind::Back };
+            let place = Patch { surface: element.source, domain: element.domain, back: element.kind == Kind::Back };
             let visibility = &self.solution.scene.visibility;
             let nearby = Nearby::new(self.tracer.emitters(), visibility, &place, leaf.0);
+            let nearby = if self.mode == Mode::Samples {
+                nearby.with_occluders(self.tracer.emitters(), visibility, &place)
+            } else {
+                nearby
+            };
             let geometry = &visibility.geometries()[element.source as usize];
             let direct = |k: u32| {
                 let uv = geometry.domain_point(element.domain, 0.5 * (k % 3) as f32, 0.5 * (k / 3) as f32);
                 let [all, indirect] = [self.solution.irradiance(leaf, uv), self.solution.indirect_irradiance(leaf, uv)];
                 (all - indirect).element_sum()
             };
-            let are_even = nearby.is_even_half_shadow((0..9).map(direct));
+            let are_even = !nearby.is_all_outlined() && nearby.is_even_half_shadow((0..9).map(direct));
             Box::new(Lights { nearby, are_even })
         });
         Some(lights)
@@ -603,8 +590,8 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         }
         if self.lobe(met).is_none() {
             let count = shared.lobe_rays;
-            // Fewer are spread evenly among themselves, not among those that went before.
-            let dimension = if count == LOBE_RAYS { 1 } else { 6 };
+            // Where there are fewer or more of them than before, they are spread evenly among themselves.
+            let dimension = if count == FIRST_LOBE_RAYS { 1 } else { 6 };
             let turns: [Vec2; LOBE_RAYS] =
                 std::array::from_fn(|k| sampler.split(count as u32, k as u32).pair(dimension));
             let pairs = [2, 3].map(|dimension| sampler.pair(dimension));
@@ -616,7 +603,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             };
             let followed = self.tracer.glossy(&met.hit, -met.away, pairs, &turns[..count], &mut beyond);
             if bounce == 0 {
-                shared.noise[1].add(followed.element_sum());
+                shared.noise[1].add(followed.element_sum(), count);
             }
             return light + followed;
         }
@@ -836,21 +823,45 @@ mod tests {
         (scene, Camera { eye, target, up, fov_x: 50.0, width: 48, height: 32 })
     }
 
-    /// Where emitters are partly hidden all over a leaf, vertices know their light as well as rays of pixels do, and without noise.
-    /// Where diffuse light is what is noisy, in half shadow, few rays follow a lobe, and never none.
+    /// Light of a lamp behind a plate is the same cut out as by rays, but without noise; and a pixel that sees it evenly has one ray.
     #[test]
-    fn rays_go_where_the_noise_is() {
-        for (diffuse, lobe, expected) in
-            [(1.0, 0.01, 1), (1.0, 1.0, 4), (0.0, 1.0, LOBE_RAYS), (1.0, 0.0, LOBE_RAYS), (f32::NAN, 1.0, LOBE_RAYS)]
-        {
-            assert_eq!(lobe_rays([diffuse, lobe]), expected, "variances {diffuse} and {lobe}");
+    fn shadows_that_are_cut_out_are_those_of_rays() {
+        let (mut scene, camera) = below_slats();
+        scene.surfaces.truncate(2);
+        let quad = |x: f64| {
+            Shape::Quad([(x, -1.0), (x + 0.5, -1.0), (x + 0.5, 1.0), (x, 1.0)].map(|(x, y)| DVec3::new(x, y, 0.6)))
+        };
+        scene.surfaces.extend([-0.9, 0.2].map(|x| Surface::new(quad(x), 0)));
+        let scene = Arc::new(scene);
+        let cameras = [camera];
+        let purpose = Purpose { distributions: false, cameras: Some(&cameras[..]) };
+        let asked = Solved::awaited(Arc::clone(&scene), Settings::with_error(0.1), purpose, &mut |_| Wait::Whole);
+        let solved = asked.expect("a sound scene").0;
+        let caster = || RayCaster::new(&scene, &solved.solution, Mode::Samples);
+        let (exact, mut asking) = (caster(), caster());
+        for (leaf, place) in asking.lights.iter_mut().enumerate() {
+            let element = &solved.solution.elements.nodes[leaf];
+            if element.is_patch() {
+                let patch = Patch { surface: element.source, domain: element.domain, back: element.kind == Kind::Back };
+                let nearby =
+                    Nearby::new(exact.tracer.emitters(), &solved.solution.scene.visibility, &patch, leaf as u32);
+                *place = OnceLock::from(Box::new(Lights { nearby, are_even: false }));
+            }
         }
-        let mut spread = Spread::default();
-        assert_eq!(spread.variance(), 0.0, "of nothing");
-        [1.0, 3.0].into_iter().for_each(|number| spread.add(number));
-        assert_eq!(spread.variance(), 1.0);
+        let [smooth, noisy] = [&exact, &asking].map(|caster| caster.render(&camera, &|_| ()).pixels);
+        let [spared, asked] = [&exact, &asking].map(RayCaster::spared);
+        assert!(spared.exact_shadows > 3_000 && spared.smooth_pixels > 200, "{spared:?}");
+        assert!(asked.exact_shadows == 0 && asked.smooth_pixels == 0, "{asked:?}");
+        let difference = |i: usize| (smooth[i] - noisy[i]).x;
+        let light: f32 = noisy.iter().map(|pixel| pixel.x).sum();
+        let (sum, off) =
+            (0..smooth.len()).fold((0.0, 0.0), |(sum, off), i| (sum + difference(i), off + difference(i).abs()));
+        assert!((sum / light).abs() < 0.005 && off / light < 0.1, "{:.4}, {:.4}", sum / light, off / light);
+        let rough = |pixels: &[Rgb]| pixels.windows(3).map(|p| (p[0].x - 2.0 * p[1].x + p[2].x).abs()).sum::<f32>();
+        assert!(rough(&smooth) < 0.5 * rough(&noisy), "{} {}", rough(&smooth), rough(&noisy));
     }
 
+    /// Where emitters are partly hidden all over a leaf, vertices know their light as well as rays of pixels do, and without noise.
     #[test]
     fn half_shadow_is_as_bright_from_vertices_as_from_rays() {
         let (scene, camera) = below_slats();

@@ -8,6 +8,7 @@ use super::spherical::Spherical;
 use glam::{Vec2, Vec3};
 use hr_diffuse::beams::spot_ramp;
 use hr_diffuse::form_factor::{point_to_sphere, point_to_surface};
+use hr_diffuse::visibility::{Occluders, Patch};
 use hr_diffuse::{Domain, Geometry, Light, LightKind, Normalization, Rgb, Shape, Surface};
 use hr_scene::Scene;
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -360,6 +361,25 @@ impl Emitters {
                     density: f32::INFINITY,
                 })
             }
+        }
+    }
+
+    /// The part of a surface that an emitter is, if its light has the same radiance from everywhere.
+    pub(super) fn patch(&self, entry: u32) -> Option<Patch> {
+        match &self.entries[entry as usize].source {
+            Source::Surface(Glow { surface, domain, back, .. }) if !self.is_glowing(entry) => {
+                Some(Patch { surface: *surface, domain: *domain, back: *back })
+            }
+            _ => None,
+        }
+    }
+
+    /// Irradiance of what is seen of an emitter at a point, by a unit normal and above the horizon of the surface's, if all is known that
+    /// may hide parts of it.
+    pub(super) fn visible(&self, entry: u32, occluders: &Occluders, at: Vec3, normals: [Vec3; 2]) -> Rgb {
+        match &self.entries[entry as usize].source {
+            Source::Surface(glow) => glow.radiance * PI * occluders.visible_factor(at, normals),
+            _ => Rgb::ZERO,
         }
     }
 

@@ -7,9 +7,9 @@
 
 use super::emitters::{Arrival, Emitters};
 use glam::{Vec2, Vec3};
+use hr_diffuse::Visibility;
 use hr_diffuse::sampling::{hash, point2};
-use hr_diffuse::visibility::NO_BLOCKER;
-use hr_diffuse::{Domain, Visibility};
+use hr_diffuse::visibility::{NO_BLOCKER, Occluders, Patch};
 
 /// Share of draws that go by power alone.
 const BY_POWER: f32 = 0.1;
@@ -44,23 +44,16 @@ const MUCH: f32 = 0.01;
 const LEAST_SEEN: f32 = 0.1;
 /// Emitters that bring less than this of all are left to power.
 const FAINT: f32 = 1e-4;
+/// Polygons in the way of emitters that a place may have, at most, and emitters: more take longer than rays do.
+const MOST_OCCLUDERS: usize = 32;
+/// Of so small a share of all light nothing more is asked.
+const NEGLIGIBLE: f32 = 1e-3;
 /// Half shadow is even where what is seen differs by less than this share of an emitter …
 const UNEVEN: f32 = 0.15;
 /// … and is less than this share.
 const LIGHT: f32 = 0.9;
 /// Cosine that counts at least: shading normals are bent, and places are large.
 const LEAST_COSINE: f32 = 0.05;
-
-/// One side of a part of a surface, whose emitters are looked for.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    /// The surface.
-    pub surface: u32,
-    /// The part of it.
-    pub domain: Domain,
-    /// Whether it is its back.
-    pub back: bool,
-}
 
 /// The emitters of a place, and the chance of each.
 #[derive(Clone, Debug, Default)]
@@ -74,6 +67,10 @@ pub struct Nearby {
     /// Least irradiance, sum of channels, that one of those which bring much would bring were nothing between; 0 if some of them are
     /// seen by all rays.
     half_shadow: f32,
+    /// Emitters that are polygons, with all that may hide parts of them: what they bring is known without chance. They are not drawn.
+    outlined: Vec<(u32, Occluders)>,
+    /// Share of the others in what all bring.
+    rest: f32,
 }
 
 /// An emitter that is looked at.
@@ -88,7 +85,7 @@ struct Found {
 struct Look<'a> {
     emitters: &'a Emitters,
     visibility: &'a Visibility,
-    place: &'a Place,
+    place: &'a Patch,
     seed: u32,
 }
 
@@ -127,7 +124,7 @@ impl Look<'_> {
 impl Nearby {
     /// Looks for them by rays.
     #[must_use]
-    pub fn new(emitters: &Emitters, visibility: &Visibility, place: &Place, seed: u32) -> Self {
+    pub fn new(emitters: &Emitters, visibility: &Visibility, place: &Patch, seed: u32) -> Self {
         let look = Look { emitters, visibility, place, seed };
         let points: [_; RAYS as usize] = std::array::from_fn(|k| look.point(point2(hash(seed, 0), k as u32)));
         let rim = RIM.map(|u| look.point(u));
@@ -177,7 +174,60 @@ impl Nearby {
             entries: found.iter().map(|found| found.entry).collect(),
             seen: found.iter().map(|found| found.seen).collect(),
             half_shadow,
+            outlined: Vec::new(),
+            rest: 1.0,
         }
+    }
+
+    /// Finds all that may hide parts of emitters from the place, of those that bring most first, as long as that is not too much.
+    #[must_use]
+    pub fn with_occluders(mut self, emitters: &Emitters, visibility: &Visibility, place: &Patch) -> Self {
+        let shares: Vec<f32> = (0..self.entries.len()).map(|at| self.share(at)).collect();
+        let mut order: Vec<usize> = (0..shares.len()).collect();
+        order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]));
+        let known = order.into_iter().map(|at| self.entries[at]);
+        // A few rays may have missed that an emitter is seen from a corner of the place.
+        let others = (0..emitters.len() as u32).filter(|entry| self.entries.binary_search(entry).is_err());
+        let mut left = MOST_OCCLUDERS;
+        for entry in known.chain(others) {
+            if left == 0 {
+                break;
+            }
+            let found = emitters.patch(entry).and_then(|sender| visibility.occluders(place, &sender, left - 1));
+            if let Some(occluders) = found {
+                left -= occluders.polygons();
+                self.outlined.push((entry, occluders));
+            }
+        }
+        self.outlined.sort_unstable_by_key(|(entry, _)| *entry);
+        let is_drawn: Vec<bool> = self.entries.iter().map(|&entry| !self.is_outlined(entry)).collect();
+        let mut sum = 0.0;
+        for ((so_far, share), is_drawn) in self.sums.iter_mut().zip(&shares).zip(is_drawn) {
+            sum += if is_drawn { *share } else { 0.0 };
+            *so_far = sum;
+        }
+        if sum > 0.0 {
+            self.sums.iter_mut().for_each(|so_far| *so_far /= sum);
+        }
+        self.rest = sum;
+        self
+    }
+
+    /// Whether all is known that may hide parts of an emitter.
+    pub(super) fn is_outlined(&self, entry: u32) -> bool {
+        self.outlined.binary_search_by_key(&entry, |(entry, _)| *entry).is_ok()
+    }
+
+    /// The emitters of which all is known that may hide parts of them.
+    #[must_use]
+    pub fn all_outlined(&self) -> &[(u32, Occluders)] {
+        &self.outlined
+    }
+
+    /// Whether what these bring is all but nothing of the light.
+    #[must_use]
+    pub fn is_all_outlined(&self) -> bool {
+        self.rest <= NEGLIGIBLE
     }
 
     /// Whether emitters that are all partly seen light the place about evenly, by what they are said to bring (irradiance, sum of
@@ -193,13 +243,15 @@ impl Nearby {
 
     /// The emitters that bring much, of which some ray saw something, and the share that is seen of each.
     pub(super) fn surely_seen(&self) -> impl Iterator<Item = (u32, f32)> {
-        let brings_much = |&at: &usize| self.share(at) >= MUCH && self.seen[at] > LEAST_SEEN;
+        let brings_much =
+            |&at: &usize| self.share(at) >= MUCH && self.seen[at] > LEAST_SEEN && !self.is_outlined(self.entries[at]);
         (0..self.entries.len()).filter(brings_much).map(|at| (self.entries[at], self.seen[at]))
     }
 
     /// Whether something hides parts of emitters from here, or parts of the place from them.
     pub(super) fn is_shaded(&self) -> bool {
-        self.seen.iter().any(|&seen| seen > LEAST_SEEN && seen < 1.0)
+        let is_shaded = |at: usize| self.seen[at] > LEAST_SEEN && self.seen[at] < 1.0;
+        (0..self.entries.len()).any(|at| is_shaded(at) && !self.is_outlined(self.entries[at]))
     }
 
     /// Share of an emitter that is seen, about, > 0.
@@ -249,7 +301,7 @@ mod tests {
         scene.lights = vec![Light { position, intensity: Rgb::splat(1e-4), kind: LightKind::Point }];
         let rays = visibility(&scene).expect("sound");
         let tracer = PathTracer::new(&scene, &rays);
-        let ground = Place { surface: 0, domain: Domain::WHOLE, back: false };
+        let ground = Patch { surface: 0, domain: hr_diffuse::Domain::WHOLE, back: false };
         let nearby = Nearby::new(tracer.emitters(), &rays, &ground, 3);
         let count = tracer.emitters().len() as u32;
         let by_power = 1.0 / count as f32;
@@ -287,7 +339,7 @@ mod tests {
         scene.surfaces.truncate(3);
         let rays = visibility(&scene).expect("sound");
         let tracer = PathTracer::new(&scene, &rays);
-        let ground = Place { surface: 0, domain: Domain::WHOLE, back: false };
+        let ground = Patch { surface: 0, domain: hr_diffuse::Domain::WHOLE, back: false };
         let lamp = tracer.emitters().of_surface(2).expect("it shines");
         for seed in 0..40 {
             let seen = Nearby::new(tracer.emitters(), &rays, &ground, seed).seen(lamp);

@@ -1,6 +1,7 @@
 use super::*;
 use glam::{Mat3, dvec3};
 use glossy_ext::{Lambert, Ward};
+use hr_diffuse::visibility::Patch;
 use hr_diffuse::{Light, LightKind, Shape, Surface};
 use hr_scene::{Material, Primaries, ToneMap};
 
@@ -106,7 +107,7 @@ fn draws(scene: &Scene, count: u32, seed: u32, is_known: bool) -> Vec<f64> {
     let [origin, target] = [eye, at].map(|point| tracer.normalization.to_unit(point));
     let direction = (target - origin).normalize();
     let hit = rays.closest(origin, direction, START, f32::MAX).expect("the ground");
-    let ground = Place { surface: 0, domain: hr_diffuse::Domain::WHOLE, back: false };
+    let ground = Patch { surface: 0, domain: hr_diffuse::Domain::WHOLE, back: false };
     let nearby = is_known.then(|| Nearby::new(tracer.emitters(), &rays, &ground, seed));
     let draw = |index| f64::from(tracer.irradiance(&hit, direction, &Sampler::new(seed, index), nearby.as_ref()).x);
     (0..count).map(draw).collect()
@@ -331,7 +332,7 @@ fn emitters_that_are_seen_are_drawn_and_the_mean_stays() {
     let scene = hidden_lamp();
     let rays = visibility(&scene).expect("sound");
     let tracer = PathTracer::new(&scene, &rays);
-    let place = Place { surface: 0, domain: hr_diffuse::Domain::WHOLE, back: false };
+    let place = Patch { surface: 0, domain: hr_diffuse::Domain::WHOLE, back: false };
     let [knowing, not_knowing] = [Nearby::new(tracer.emitters(), &rays, &place, 1), Nearby::default()].map(Ground);
     let unit = |p: DVec3| tracer.normalization.to_unit(p);
     let (origin, target) = (unit(dvec3(1.0, 0.3, 0.5)), unit(DVec3::ZERO));
