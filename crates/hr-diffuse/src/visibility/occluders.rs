@@ -121,8 +121,8 @@ impl Occluders {
         self.planes.len()
     }
 
-    /// Form factor from the point `x` of the patch to what is seen from there of the sender, by the unit normal `n`, which may be a
-    /// shading normal, above the horizon of the surface's own `normal`. It takes time in proportion to the polygons in the way, and to the
+    /// Form factor (0…1) from the point `x` of the patch, in unit space, to what is seen from there of the sender, by the unit normal `n`, which may be a
+    /// shading normal, above the horizon of the surface's own `normal`. Right to rounding, some 1e-6; it takes time in proportion to the polygons in the way, and to the
     /// pieces that they leave.
     #[must_use]
     pub fn visible_factor(&self, x: Vec3, [n, normal]: [Vec3; 2]) -> f32 {
