@@ -5,8 +5,6 @@ use crate::geometry::Aabb;
 use crate::hierarchy::{Element, Kind, SceneData};
 use crate::segments::DISTANT;
 use crate::visibility::{End, MOST_LISTED, NO_BLOCKER, Proof, Shaft};
-use glam::Vec3;
-use smallvec::SmallVec;
 
 /// What is proved of all segments between points of two nodes that face each other. What of clusters hides the rest of them
 /// is not looked into: of these only that nothing is between can be proved, or that one surface hides all.
@@ -32,13 +30,9 @@ pub(crate) fn shaft(scene: &SceneData, receiver: &Element, sender: &Element) -> 
 }
 
 fn end(scene: &SceneData, element: &Element) -> End {
-    if element.is_patch() {
-        let geometry = &scene.surfaces()[element.source as usize];
-        if geometry.is_polygon() {
-            let corners: SmallVec<[Vec3; 4]> =
-                geometry.corners(element.domain).into_iter().map(|uv| geometry.point(uv)).collect();
-            return End::polygon(&corners, element.normals.axis);
-        }
+    let bounds = Aabb { min: element.bounds[0], max: element.bounds[1] };
+    if !element.is_patch() {
+        return End::within(bounds);
     }
-    End::within(Aabb { min: element.bounds[0], max: element.bounds[1] })
+    End::of(&scene.surfaces()[element.source as usize], element.domain, element.normals.axis, bounds)
 }

@@ -351,7 +351,8 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         if first.is_some_and(|(surface, _)| self.scene.base_color(surface, 0.0, 0.0).is_some()) {
             return None;
         }
-        if first.is_some_and(|first| !self.is_without_noise(&sight.hit(first, direction))) {
+        let is_noisy = |first| !self.is_without_noise(&sight.hit(first, direction));
+        if self.mode == Mode::Samples && first.is_some_and(is_noisy) {
             return None;
         }
         // The middle of the pixel is this ray's own.
@@ -361,16 +362,10 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         Some(seen)
     }
 
-    /// Whether what is seen at once of a surface where it was hit is known without chance.
+    /// With [`Mode::Samples`]: whether what is seen at once of a surface where it was hit is known without chance.
     fn is_without_noise(&self, hit: &Hit) -> bool {
-        match self.mode {
-            Mode::Distributions => true,
-            Mode::Gather => false,
-            Mode::Samples => {
-                let is_known = |leaf| self.knows_emitters(leaf).is_some_and(|lights| lights.nearby.is_all_outlined());
-                self.material(hit).reflector.is_diffuse() && self.solution.leaf(hit).is_none_or(is_known)
-            }
-        }
+        let is_known = |leaf| self.knows_emitters(leaf).is_some_and(|lights| lights.nearby.is_all_outlined());
+        self.material(hit).reflector.is_diffuse() && self.solution.leaf(hit).is_none_or(is_known)
     }
 
     /// What is seen in a pixel with some rounds of rays more than all have.
@@ -823,6 +818,21 @@ mod tests {
         (scene, Camera { eye, target, up, fov_x: 50.0, width: 48, height: 32 })
     }
 
+    /// One that sends rays to emitters wherever it may, as nothing is known but what is nearby.
+    fn asking_by_rays<'a>(mut caster: RayCaster<'a>, solved: &Solved) -> RayCaster<'a> {
+        for (leaf, place) in caster.lights.iter_mut().enumerate() {
+            let element = &solved.solution.elements.nodes[leaf];
+            if element.is_patch() {
+                let back = element.kind == Kind::Back;
+                let patch = Patch { surface: element.source, domain: element.domain, back };
+                let visibility = &solved.solution.scene.visibility;
+                let nearby = Nearby::new(caster.tracer.emitters(), visibility, &patch, leaf as u32);
+                *place = OnceLock::from(Box::new(Lights { nearby, are_even: false }));
+            }
+        }
+        caster
+    }
+
     /// Light of a lamp behind a plate is the same cut out as by rays, but without noise; and a pixel that sees it evenly has one ray.
     #[test]
     fn shadows_that_are_cut_out_are_those_of_rays() {
@@ -838,16 +848,7 @@ mod tests {
         let asked = Solved::awaited(Arc::clone(&scene), Settings::with_error(0.1), purpose, &mut |_| Wait::Whole);
         let solved = asked.expect("a sound scene").0;
         let caster = || RayCaster::new(&scene, &solved.solution, Mode::Samples);
-        let (exact, mut asking) = (caster(), caster());
-        for (leaf, place) in asking.lights.iter_mut().enumerate() {
-            let element = &solved.solution.elements.nodes[leaf];
-            if element.is_patch() {
-                let patch = Patch { surface: element.source, domain: element.domain, back: element.kind == Kind::Back };
-                let nearby =
-                    Nearby::new(exact.tracer.emitters(), &solved.solution.scene.visibility, &patch, leaf as u32);
-                *place = OnceLock::from(Box::new(Lights { nearby, are_even: false }));
-            }
-        }
+        let (exact, asking) = (caster(), asking_by_rays(caster(), &solved));
         let [smooth, noisy] = [&exact, &asking].map(|caster| caster.render(&camera, &|_| ()).pixels);
         let [spared, asked] = [&exact, &asking].map(RayCaster::spared);
         assert!(spared.exact_shadows > 3_000 && spared.smooth_pixels > 200, "{spared:?}");
@@ -872,13 +873,7 @@ mod tests {
         let asked = Solved::awaited(Arc::clone(&scene), settings, purpose, &mut |_| Wait::Whole);
         let solved = asked.expect("a sound scene").0;
         let caster = || RayCaster::new(&scene, &solved.solution, Mode::Samples);
-        let (believing, mut asking) = (caster(), caster());
-        for (leaf, place) in asking.lights.iter_mut().enumerate() {
-            if solved.solution.elements.nodes[leaf].is_patch() {
-                let nearby = believing.lights(NodeId(leaf as u32)).map(|lights| lights.nearby.clone());
-                *place = OnceLock::from(Box::new(Lights { nearby: nearby.expect("of all nodes"), are_even: false }));
-            }
-        }
+        let (believing, asking) = (caster(), asking_by_rays(caster(), &solved));
         let [smooth, noisy] = [&believing, &asking].map(|caster| caster.render(&camera, &|_| ()).pixels);
         assert!(
             believing.spared().half_shadows > 1_000 && asking.spared().half_shadows == 0,

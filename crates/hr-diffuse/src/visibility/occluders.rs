@@ -98,13 +98,9 @@ fn is_facing(part: Part<'_>, polygon: Part<'_>) -> bool {
     }
 }
 
-fn end(part: Part<'_>) -> End {
-    if !part.geometry.is_polygon() {
-        return End::within(part.geometry.bounds(part.domain));
-    }
-    let (corners, normal) = outline(part);
-    let corners: SmallVec<[Vec3; 4]> = corners.iter().map(|corner| corner.as_vec3()).collect();
-    End::polygon(&corners, normal.as_vec3())
+fn end(Part { geometry, domain, back }: Part<'_>) -> End {
+    let front = geometry.normal(geometry.middle(domain));
+    End::of(geometry, domain, if back { -front } else { front }, geometry.bounds(domain))
 }
 
 impl Occluders {

@@ -6,7 +6,7 @@
 //! is listed: rays need be tested against no others.
 
 use super::{HalfSpace, Span, Visibility};
-use crate::geometry::{Aabb, Geometry};
+use crate::geometry::{Aabb, Domain, Geometry};
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 use smallvec::SmallVec;
 
@@ -87,6 +87,15 @@ impl End {
         let height = corners.iter().map(|p| normal.dot(*p)).fold(f32::INFINITY, f32::min);
         let bounds = Aabb::of_points(corners.iter().copied());
         Self { corners: Corners::new(corners), bounds, plane: Some(normal.extend(height)) }
+    }
+
+    /// One side of a part of a surface, given its unit normal, if it is a polygon; else the box around it.
+    pub(crate) fn of(geometry: &Geometry, domain: Domain, normal: Vec3, bounds: Aabb) -> Self {
+        if !geometry.is_polygon() {
+            return Self::within(bounds);
+        }
+        let corners: SmallVec<[Vec3; 4]> = geometry.corners(domain).into_iter().map(|uv| geometry.point(uv)).collect();
+        Self::polygon(&corners, normal)
     }
 
     /// All that is in a box.

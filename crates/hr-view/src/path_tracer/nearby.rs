@@ -289,7 +289,7 @@ impl Nearby {
 mod tests {
     use super::super::tests::{hidden_lamp, material};
     use super::*;
-    use crate::path_tracer::{PathTracer, visibility};
+    use crate::path_tracer::{PathTracer, Sampler, visibility};
     use glossy_ext::Lambert;
     use hr_diffuse::{Light, LightKind, Rgb};
 
@@ -323,6 +323,32 @@ mod tests {
         let [strong, weak] =
             [2, 3].map(|surface| chances[tracer.emitters().of_surface(surface).expect("it shines") as usize]);
         assert!(weak > strong, "hidden: {strong}, seen: {weak}");
+    }
+
+    /// Where some emitters are cut out and others drawn, all of their light arrives, and nothing is drawn of the former by what is known.
+    #[test]
+    fn what_is_cut_out_and_what_is_drawn_add_up() {
+        let mut scene = hidden_lamp();
+        let position = glam::dvec3(0.0, 0.0, 0.2);
+        scene.lights = vec![Light { position, intensity: Rgb::splat(0.02), kind: LightKind::Point }];
+        let rays = visibility(&scene).expect("sound");
+        let tracer = PathTracer::new(&scene, &rays);
+        let ground = Patch { surface: 0, domain: hr_diffuse::Domain::WHOLE, back: false };
+        let drawn = Nearby::new(tracer.emitters(), &rays, &ground, 3);
+        let cut = drawn.clone().with_occluders(tracer.emitters(), &rays, &ground);
+        let lamps = [2, 3].map(|surface| tracer.emitters().of_surface(surface).expect("it shines"));
+        assert!(lamps.iter().all(|&lamp| cut.is_outlined(lamp)) && !cut.is_all_outlined());
+        assert_eq!(lamps.map(|lamp| cut.chance(lamp, 0.5)), [BY_POWER * 0.5; 2]);
+        let (point, normal) = rays.geometries()[0].sample(ground.domain, 0.4, 0.7);
+        let hit = rays.closest(point + normal * 0.01, -normal, 0.0, 1.0).expect("the ground");
+        assert_eq!(hit.surface, 0);
+        let mean = |nearby: &Nearby| {
+            const DRAWS: u32 = 4096;
+            let draw = |i| tracer.irradiance(&hit, -normal, &Sampler::new(5, i), Some(nearby)).x;
+            (0..DRAWS).map(draw).sum::<f32>() / DRAWS as f32
+        };
+        let (found, expected) = (tracer.outlined(&hit, -normal, &cut).x + mean(&cut), mean(&drawn));
+        assert!((found - expected).abs() < 0.01 * expected, "{found}, drawn {expected}");
     }
 
     #[test]
