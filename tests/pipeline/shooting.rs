@@ -1,11 +1,11 @@
 //! Gathering and shooting lead to the same light, glossy light included.
 
-use crate::scenes::{Room, bits, mean_radiosity};
-use glam::Vec3;
-use glossy_ext::GlossyField;
+use crate::scenes::{Room, bits, mean_radiosity, quad, walls};
+use glam::{DVec3, Vec3};
 use glossy_ext::haar::Refinement;
+use glossy_ext::{GlossyField, Lambert, MetallicRoughness, Reflector};
 use hr_diffuse::hooks::conformance::Watched;
-use hr_diffuse::{LightField, Phase, Rgb, SceneInput, Settings, Solution, Solver, Transport};
+use hr_diffuse::{DiffuseMaterial, LightField, Phase, Rgb, SceneInput, Settings, Solution, Solver, Transport};
 use hr_scene::Scene;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -83,6 +83,23 @@ fn a_glossy_room_has_the_same_light_either_way() {
     let ratio = all(&shot) / all(&gathered);
     assert!((ratio - 1.0).abs() < ERROR, "samples add up to {ratio} times those of gathering");
     assert!(shot.reflected.iter().any(|haar| !haar.is_empty()), "all that was shot is reflected in the end");
+}
+
+/// Of light between polished metals little is new after some reflections, but what is to come of it adds up.
+#[test]
+fn a_room_of_metal_has_the_same_light_either_way() {
+    const ERROR: f32 = 0.3;
+    let metal = MetallicRoughness::new(Rgb::splat(0.9), 1.0, 0.5).expect("a metal");
+    let reflectors: Vec<Arc<dyn Reflector>> = vec![Arc::new(metal), Arc::new(Lambert::BLACK)];
+    let material = |exitance| DiffuseMaterial { reflectance: Rgb::ZERO, exitance, two_sided: false };
+    let mut surfaces = walls(DVec3::ZERO, DVec3::new(4.0, 3.0, 2.5), 0);
+    surfaces.push(quad(DVec3::new(1.5, 1.0, 2.375), DVec3::Y, DVec3::X, 1));
+    let materials = vec![material(Rgb::ZERO), material(Rgb::ONE)];
+    let input = SceneInput { surfaces, materials, ..SceneInput::default() };
+    let [gathered, shot] = [Transport::Gather, Transport::Shoot]
+        .map(|transport| solve(&input, ERROR, transport, GlossyField::new(&reflectors, Refinement::default())));
+    let off = difference(&shot, &gathered) / ERROR;
+    assert!(off < 0.3, "the answers differ by {off:.3} times the error asked for");
 }
 
 /// Glossy light is shot anew over each set of links. Who stops it then has no less light than there was before.

@@ -60,7 +60,7 @@ pub(crate) fn most_times(reflectance: Rgb, faint: Rgb) -> f32 {
 mod tests {
     use super::*;
     use crate::hooks::{Arrived, Hierarchy, NodeId, Transfer};
-    use crate::{Cone, DiffuseMaterial, Light, LightKind, SceneInput, Settings, Shape, Solver, Surface};
+    use crate::{Cone, DiffuseMaterial, Light, LightKind, SceneInput, Settings, Shape, Solver, Surface, Transport};
     use glam::{DVec3, Vec3};
     use std::ops::ControlFlow;
 
@@ -91,7 +91,7 @@ mod tests {
     }
 
     /// What a floor of this reflectance sends of all that arrives from the sun, whose cosine is given.
-    fn reflected(reflectance: f32, cosine: f32) -> f32 {
+    fn reflected(reflectance: f32, cosine: f32, transport: Transport) -> f32 {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| DVec3::new(x, y, 0.0));
         let floor = DiffuseMaterial { reflectance: Rgb::splat(reflectance), exitance: Rgb::ZERO, two_sided: false };
         let direction = Vec3::new((1.0 - cosine * cosine).sqrt(), 0.0, -cosine);
@@ -102,7 +102,8 @@ mod tests {
             lights: vec![Light { position: DVec3::ZERO, intensity: Rgb::ONE, kind }],
             ..SceneInput::default()
         };
-        let mut solver = Solver::new(&input, Settings::with_error(0.3), Dielectric).expect("the floor is sound");
+        let settings = Settings { transport, ..Settings::with_error(0.3) };
+        let mut solver = Solver::new(&input, settings, Dielectric).expect("the floor is sound");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         let leaf = solver.elements.patch_leaves().next().expect("it has a leaf") as usize;
         solver.exitant.radiosity[leaf].x / solver.exitant.irradiance[leaf].x
@@ -110,15 +111,17 @@ mod tests {
 
     #[test]
     fn what_grazes_is_reflected_more_than_what_falls() {
-        for cosine in [0.1, 0.3, 0.9] {
-            let (found, exact) = (reflected(0.2, cosine), 0.2 + 3.0 * MEAN * (1.0 - cosine));
-            assert!((found - exact).abs() < 0.005, "{found}, not {exact}, at {cosine}");
+        for transport in [Transport::Gather, Transport::Shoot] {
+            for cosine in [0.1, 0.3, 0.9] {
+                let (found, exact) = (reflected(0.2, cosine, transport), 0.2 + 3.0 * MEAN * (1.0 - cosine));
+                assert!((found - exact).abs() < 0.005, "{transport:?}: {found}, not {exact}, at {cosine}");
+            }
         }
     }
 
     #[test]
     fn nothing_reflects_more_than_arrives() {
-        assert!((reflected(0.9, 0.01) - MOST).abs() < 1e-4, "what grazes a white floor");
+        assert!((reflected(0.9, 0.01, Transport::Gather) - MOST).abs() < 1e-4, "what grazes a white floor");
         assert!((most_times(Rgb::splat(0.97), Rgb::splat(0.03)) - 1.0).abs() < 1e-6, "as much as on average");
     }
 }

@@ -475,15 +475,15 @@ impl Gather {
         ControlFlow::Continue(())
     }
 
-    /// By leaf, how many times the mean its material reflects beside the diffuse part of what arrived there last.
+    /// By leaf, how many times the mean its material reflects beside the diffuse part of what links brought there.
     pub(crate) fn grazing<L: LightField>(
         &self,
         light: Light<'_, L>,
-        links: &Links,
+        (links, brought): (&Links, &[Rgb]),
         grazing: &Grazing,
     ) -> Vec<(u32, f32)> {
         let weighed = threads::map_range(0..links.all().len(), 256, |at| {
-            let (link, arriving) = (&links.all()[at], self.arriving[at].element_sum().max(0.0));
+            let (link, arriving) = (&links.all()[at], brought[at].element_sum().max(0.0));
             let receiver = light.element(link.receiver);
             let direction = light.direction_to(receiver.center, link.sender);
             let knows = receiver.is_patch() && receiver.is_flat();

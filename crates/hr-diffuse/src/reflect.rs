@@ -413,7 +413,7 @@ impl<L: LightField> Solver<L> {
         }
         let settled = SETTLED_SHARE * self.settings.error;
         let tolerance = match (new, how) {
-            (Some(_), _) => NEW_SHARE * self.settings.error,
+            (Some(_), _) => self.negligibly_new(),
             (None, Reflect::Changed) => settled,
             (None, _) => settled.max(RESHAPED),
         };

@@ -26,8 +26,8 @@ use std::ops::ControlFlow;
 /// the reflections to come would make of it: half of what light may be from settled.
 const UNSHOT_SHARE: f32 = 0.01;
 /// New light on a leaf is reflected by the extension unless it is below this share of the error asked for, relative to all that
-/// has arrived.
-pub(crate) const NEW_SHARE: f32 = 0.5;
+/// has arrived, and to what the reflections to come would make of it.
+pub(crate) const NEW_SHARE: f32 = 0.25;
 /// However slowly light settles, it is not known better.
 const SLOWEST: f32 = 0.999;
 
@@ -103,6 +103,11 @@ impl Shot {
             *sum += more;
         }
         links.all().iter().filter(|link| !self.shoots[link.sender as usize]).count() as u64
+    }
+
+    /// By link, the irradiance carried so far.
+    pub(crate) fn carried(&self) -> &[Rgb] {
+        &self.carried
     }
 
     /// Adds what a leaf received. Returns what it received in all.
@@ -181,11 +186,21 @@ impl<L: LightField> Solver<L> {
 
     /// Share of a node's light below which it need not be shot.
     pub(crate) fn negligibly_unshot(&self) -> f32 {
-        // Light settles at the rate of the last iterations, and no faster than what is reflected on average.
-        let rate = |pair: &[f32]| pair[1] / pair[0];
+        UNSHOT_SHARE * self.settings.error * self.lost()
+    }
+
+    /// Share of a leaf's light below which what is new of it need not be reflected by the extension.
+    pub(crate) fn negligibly_new(&self) -> f32 {
+        NEW_SHARE * self.settings.error * self.lost()
+    }
+
+    /// What is lost with each reflection, as a share: the reciprocal of what all reflections to come make of light.
+    fn lost(&self) -> f32 {
+        // Light settles at the rate of the last iterations, and no faster than what is reflected on average. What is new is told as a share of
+        // all light, which grows by it.
+        let rate = |pair: &[f32]| pair[1] / (pair[0] * (1.0 - pair[1]));
         let last = &self.stats.residuals[self.stats.residuals.len().saturating_sub(3)..];
         let last = last.windows(2).map(rate).filter(|rate| rate.is_finite()).fold(0.0, f32::max);
-        let rate = last.max(self.elements.nodes[0].reflectance.max_element()).min(SLOWEST);
-        UNSHOT_SHARE * self.settings.error * (1.0 - rate)
+        1.0 - last.max(self.elements.nodes[0].reflectance.max_element()).min(SLOWEST)
     }
 }

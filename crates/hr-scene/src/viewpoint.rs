@@ -364,9 +364,11 @@ fn shape_bounds(shape: &Shape) -> (DVec3, DVec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builtin;
     use crate::builtin::tests::grey;
+    use crate::{Material, builtin};
+    use glossy_ext::Lambert;
     use hr_diffuse::Surface;
+    use std::sync::Arc;
 
     fn without_cameras(name: &str) -> Scene {
         let mut scene = builtin::scene(name).expect("a built-in scene");
@@ -508,6 +510,24 @@ mod tests {
         // The balls of the heap are not lost on the ground: they are 2 m wide.
         let eye = DVec3::from(lit(heap(ground(4000.0))).default_camera().eye);
         assert!(eye.length() < 30.0, "near the balls: {eye}");
+    }
+
+    #[test]
+    fn default_cameras_look_away_from_what_is_black() {
+        let mut surfaces = open_box(DVec3::ZERO, DVec3::new(4.0, 3.0, 4.0), &[]);
+        surfaces.push(lamp(DVec3::new(2.0, 2.9, 2.0), 0.5));
+        let mut scene = lit(surfaces);
+        scene.materials.push(Material { reflector: Arc::new(Lambert::BLACK), ..grey("black", false, 0.0) });
+        let before = scene.default_camera().frame().2;
+        for wall in [0, 1, 4, 5] {
+            let mut blackened = scene.clone();
+            blackened.surfaces[wall].material = 2;
+            let Shape::Quad(corners) = blackened.surfaces[wall].shape else { continue };
+            let middle = corners.iter().sum::<DVec3>() / 4.0;
+            let camera = blackened.default_camera();
+            let toward = unit(middle - DVec3::from(camera.eye)).dot(camera.frame().2);
+            assert!(toward < 0.6, "wall {wall}: {toward} toward it, {before} when it was grey");
+        }
     }
 
     #[test]

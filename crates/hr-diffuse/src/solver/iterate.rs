@@ -6,6 +6,7 @@ use crate::faint::{Grazing, most_times};
 use crate::hierarchy::Kind;
 use crate::hooks::LightField;
 use crate::reflect::Reflect;
+use crate::shooting::Shot;
 use crate::{Facing, Rgb};
 use glam::DVec3;
 use std::ops::ControlFlow;
@@ -98,12 +99,12 @@ impl<L: LightField> Solver<L> {
         }
     }
 
-    /// Finds out how much of what arrives leaves reflect beside the diffuse part where that travels as diffuse light. What is shot comes
-    /// piece by piece, which tells of none how it arrives all in all.
+    /// Finds out how much of what arrives leaves reflect beside the diffuse part where that travels as diffuse light.
     fn weigh_faint(&mut self) {
-        let grazing = if self.shot.is_some() { None } else { Grazing::new(&self.field, &self.faint) };
-        let Some(grazing) = grazing else { return };
-        let found = self.gather.grazing(self.light(), &self.links, &grazing);
+        let Some(grazing) = Grazing::new(&self.field, &self.faint) else { return };
+        // What is shot comes piece by piece.
+        let brought = self.shot.as_ref().map_or_else(|| self.gather.arriving(), Shot::carried);
+        let found = self.gather.grazing(self.light(), (&self.links, brought), &grazing);
         self.faint_times.clear();
         self.faint_times.resize(self.elements.nodes.len(), 1.0);
         for (leaf, times) in found {

@@ -123,8 +123,12 @@ impl<'a> Sight<'a> {
 
     /// Whether the side that was hit is more than black.
     fn shows(&self, hit: &Hit) -> bool {
-        let material = self.surfaces[hit.surface as usize].material;
-        hit.front || self.scene.materials.get(material as usize).is_some_and(|m| m.two_sided)
+        let Some(material) = self.scene.materials.get(self.surfaces[hit.surface as usize].material as usize) else {
+            return false;
+        };
+        let is_black = material.reflector.is_diffuse() && material.reflector.diffuse() == Rgb::ZERO;
+        let emits = hit.front && material.exitance != Rgb::ZERO;
+        (hit.front || material.two_sided) && !is_black || emits
     }
 
     /// Whether a lamp reaches what was hit directly.
