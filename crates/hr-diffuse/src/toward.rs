@@ -32,6 +32,12 @@ const LARGE: f32 = 0.1;
 const MET: f32 = 32.0;
 /// … and takes what they say if at least so many do.
 const LEAST_MET: usize = 3;
+/// Flat senders that bring more than this times what is negligible are looked at in steps of an angle (radians) …
+const CLOSELY: f32 = 4.0;
+/// … that makes a few of the narrowest lobe that travels, which is blurred further by where its light comes from, …
+const STEP: f32 = 0.1;
+/// … and in no more steps than these one way.
+const MOST_STEPS: u32 = 24;
 /// All points look in the same directions, so that what they find changes smoothly.
 const SAME_DIRECTIONS: u32 = 0x2f1d;
 
@@ -86,7 +92,12 @@ impl<L: LightField> Light<'_, L> {
         if !self.is_wide(sender, x, 0.0) || self.directional_most(sender) * factor <= detail.negligible {
             return self.directional(sender, away);
         }
-        let seen = detail.shown.then(|| self.seen_beside(sender, (x, n), factor)).flatten();
+        let look = || {
+            let much = self.directional_most(sender) * factor > CLOSELY * detail.negligible;
+            let all_over = || much.then(|| self.seen_all_over(sender, (x, n))).flatten();
+            self.seen_beside(sender, (x, n), factor).or_else(all_over)
+        };
+        let seen = detail.shown.then(look).flatten();
         seen.unwrap_or_else(|| self.mean_directional(sender, away, &[(x, n, 1.0)]))
     }
 
@@ -118,6 +129,38 @@ impl<L: LightField> Light<'_, L> {
         }
         let share: f32 = standing.iter().map(|standing| standing.share).sum();
         (met >= LEAST_MET && all > 0.0).then(|| sum * (PI * share / all))
+    }
+
+    /// The same by points all over a flat sender, as many as its size in the view asks for. A narrow lobe is seen from one of a few points,
+    /// or from none, which shows as stars around vertices. `None` where it is not flat, or more than one leaf.
+    fn seen_all_over(&self, sender: u32, (x, n): (Vec3, Vec3)) -> Option<Rgb> {
+        let element = self.element(sender);
+        let &[Representative { leaf, share, strength }] =
+            self.exitant.senders.of(self.exitant.reflected_as[sender as usize])
+        else {
+            return None;
+        };
+        if !element.is_flat() {
+            return None;
+        }
+        let geometry = &self.scene.surfaces()[element.source as usize];
+        let steps = 2.0 * element.radius / (STEP * element.center.distance(x)).max(f32::MIN_POSITIVE);
+        let steps = (steps.ceil() as u32).clamp(2, MOST_STEPS);
+        // The size of a part takes the pole out of the kernel.
+        let least = 0.1 * (element.radius / steps as f32).powi(2);
+        let (mut sum, mut all) = (Rgb::ZERO, 0.0);
+        for i in 0..steps * steps {
+            let [s, t] = [i / steps, i % steps].map(|step| (step as f32 + 0.5) / steps as f32);
+            let at = geometry.sample(element.domain, s, t).0;
+            let toward = (at - x).normalize_or_zero();
+            let cosines = toward.dot(n).max(0.0) * (-toward).dot(element.normals.axis).max(0.0);
+            let kernel = cosines / (at.distance_squared(x) + least).max(1e-20);
+            if kernel > 0.0 {
+                all += kernel;
+                sum += self.field.radiance(&self.reflected[leaf as usize], -toward) * kernel;
+            }
+        }
+        (all > 0.0).then(|| sum * strength * (PI * share / all))
     }
 
     /// Whether a sender and what is within a radius of a point are so near that more than their middles count.
@@ -281,6 +324,26 @@ mod tests {
         let [single, toward, at] = worst;
         assert!(single > 0.5, "one direction is not enough: {single} of the peak");
         assert!(toward < 0.05 && at < 0.1, "{toward}, {at} of the peak; {single} by one direction");
+    }
+
+    /// A lobe that is narrower than its sender is wide, as it is seen from all over a surface.
+    #[test]
+    fn narrow_lobes_are_smooth_where_they_are_shown() {
+        let (solver, [sender, receiver]) = squares(0.3, Vec3::new(0.3, 0.1, 2.0), 300.0);
+        let (light, mut worst) = (solver.light(), [0.0_f32; 2]);
+        let element = light.element(receiver);
+        let geometry = &solver.scene.surfaces()[element.source as usize];
+        for i in 0..25 {
+            let [s, t] = [i / 5, i % 5].map(|step| 0.1 + 0.2 * step as f32);
+            let (x, n) = geometry.sample(element.domain, s, t);
+            let (truth, factor) = (brute_force(&solver, [sender, receiver], Some(x)), light.factor_at(x, n, sender));
+            for (worst, detail) in worst.iter_mut().zip([Detail::shown(0.0), Detail::carried(0.0)]) {
+                *worst = worst.max((light.directional_at(sender, (x, n), (factor, detail)).x - truth).abs());
+            }
+        }
+        let [shown, carried] = worst;
+        assert!(shown < 0.01, "{shown} of the peak");
+        assert!(carried > 0.1, "{carried} of the peak by four points, which are enough then");
     }
 
     /// A point of a wall next to a floor that sends most along itself, as what is smooth does of light from afar.
