@@ -2,6 +2,7 @@
 //!
 //! One program for all of it: the solver is compiled anew into each.
 
+mod caustic;
 mod determinism;
 mod diffuse;
 mod edits;

@@ -599,6 +599,11 @@ impl<B: Basis> LightField for GlossyField<B> {
         exitant.eval(away)
     }
 
+    fn radiance_beside(&self, exitant: &Outgoing<B>, (normal, offset): (Vec3, Vec3), away: Vec3) -> Rgb {
+        let from_middle = exitant.focus.from_middle(offset, -away.reflect(normal));
+        exitant.eval(-from_middle.reflect(normal))
+    }
+
     fn radiance_bounds(&self, exitant: &Outgoing<B>, away: &Cone) -> (Rgb, Rgb) {
         exitant.bounds(away)
     }

@@ -263,6 +263,11 @@ pub trait LightField: Sync {
     /// Exitant radiance (W/(m² sr)) in a direction away from a node, without the diffuse part. For nodes that are
     /// not flat: radiant intensity per unit of the node's surface area (one side).
     fn radiance(&self, exitant: &Self::Exitant, away: Vec3) -> Rgb;
+    /// The same of a place of a flat leaf, which is an offset (unit space) away from the middle that `exitant` is that of; `normal` is the
+    /// leaf's. From beside, what lights the leaf is seen in another direction.
+    fn radiance_beside(&self, exitant: &Self::Exitant, (_normal, _offset): (Vec3, Vec3), away: Vec3) -> Rgb {
+        self.radiance(exitant, away)
+    }
     /// Smallest and largest [`radiance`](Self::radiance) over a cone of directions.
     fn radiance_bounds(&self, exitant: &Self::Exitant, away: &Cone) -> (Rgb, Rgb);
     /// Bytes that a node's incident light takes beside those of `Incident` itself; for budgets of memory.

@@ -120,9 +120,11 @@ impl<L: LightField> Light<'_, L> {
                 continue;
             }
             let hit = geometry.intersect(x, toward, 0.0, f32::MAX);
-            if hit.is_some_and(|(_, uv)| geometry.contains(element.domain, uv)) {
+            if let Some((t, _)) = hit.filter(|(_, uv)| geometry.contains(element.domain, *uv)) {
                 let Representative { leaf, share, strength } = standing[met % standing.len()];
-                sum += self.field.radiance(&self.reflected[leaf as usize], -toward) * strength * share;
+                let beside = (element.normals.axis, x + toward * t - self.element(leaf).center);
+                let light = self.field.radiance_beside(&self.reflected[leaf as usize], beside, -toward);
+                sum += light * strength * share;
                 all += share;
                 met += 1;
             }
@@ -143,7 +145,8 @@ impl<L: LightField> Light<'_, L> {
         if !element.is_flat() {
             return None;
         }
-        let geometry = &self.scene.surfaces()[element.source as usize];
+        let (geometry, middle) = (&self.scene.surfaces()[element.source as usize], self.element(leaf).center);
+        let normal = element.normals.axis;
         let steps = 2.0 * element.radius / (STEP * element.center.distance(x)).max(f32::MIN_POSITIVE);
         let steps = (steps.ceil() as u32).clamp(2, MOST_STEPS);
         // The size of a part takes the pole out of the kernel.
@@ -153,11 +156,12 @@ impl<L: LightField> Light<'_, L> {
             let [s, t] = [i / steps, i % steps].map(|step| (step as f32 + 0.5) / steps as f32);
             let at = geometry.sample(element.domain, s, t).0;
             let toward = (at - x).normalize_or_zero();
-            let cosines = toward.dot(n).max(0.0) * (-toward).dot(element.normals.axis).max(0.0);
+            let cosines = toward.dot(n).max(0.0) * (-toward).dot(normal).max(0.0);
             let kernel = cosines / (at.distance_squared(x) + least).max(1e-20);
             if kernel > 0.0 {
                 all += kernel;
-                sum += self.field.radiance(&self.reflected[leaf as usize], -toward) * kernel;
+                let beside = (normal, at - middle);
+                sum += self.field.radiance_beside(&self.reflected[leaf as usize], beside, -toward) * kernel;
             }
         }
         (all > 0.0).then(|| sum * strength * (PI * share / all))

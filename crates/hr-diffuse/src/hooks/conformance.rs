@@ -412,6 +412,11 @@ impl<L: LightField> LightField for Watched<L> {
         self.field.radiance(exitant, away)
     }
 
+    fn radiance_beside(&self, exitant: &Self::Exitant, place: (Vec3, Vec3), away: Vec3) -> Rgb {
+        self.asked(away);
+        self.field.radiance_beside(exitant, place, away)
+    }
+
     fn radiance_bounds(&self, exitant: &Self::Exitant, away: &Cone) -> (Rgb, Rgb) {
         self.asked(away.axis);
         self.field.radiance_bounds(exitant, away)
