@@ -309,6 +309,15 @@ impl Check<'_> {
         if differs(value, expected, RELATIVE * size.max_element() + 1e-6) && expected.is_finite() {
             self.report(Fault::Sum { value, expected, outgoing });
         }
+        let mut each = vec![Rgb::NAN; senders.len()];
+        self.reflector.reflect_each(&senders, outgoing, &mut each);
+        for (sender, value) in std::iter::zip(&senders, each) {
+            let expected = self.reflector.reflect_sum(std::slice::from_ref(sender), outgoing);
+            if differs(value, expected, RELATIVE * expected.abs().max_element() + 1e-6) && expected.is_finite() {
+                let at = Pair { incident: sender.direction, outgoing };
+                self.report(Fault::Each { value, expected, at });
+            }
+        }
     }
 
     /// Means over senders that are disks, where brute force resolves them.
@@ -473,6 +482,7 @@ fn severity(fault: &Fault) -> f32 {
         | Fault::NotIsotropic { value: a, turned: b, .. }
         | Fault::Split { value: a, expected: b, .. }
         | Fault::Sum { value: a, expected: b, .. }
+        | Fault::Each { value: a, expected: b, .. }
         | Fault::Albedo { stated: a, integrated: b } => {
             (a - b).abs().max_element() / a.abs().max(b.abs()).max_element()
         }

@@ -343,6 +343,16 @@ impl Material {
         light
     }
 
+    /// What each sample makes of it.
+    fn reflect_each(&self, incident: &[Incident], outgoing: Vec3, reflected: &mut [Rgb]) {
+        self.reflector.reflect_each(incident, outgoing, reflected);
+        if let Some(mirror) = &self.mirror {
+            let mut mirrored = vec![Rgb::ZERO; reflected.len()];
+            mirror.reflect_each(incident, outgoing, &mut mirrored);
+            std::iter::zip(reflected, mirrored).for_each(|(light, mirrored)| *light += mirrored);
+        }
+    }
+
     /// About the radiance of a sample's lobe of some width at its brightest, sum of channels.
     fn peak(&self, sample: &Incident, width: f32) -> f32 {
         let across = (self.albedo * sample.irradiance).element_sum() * FRAC_1_PI;
@@ -461,9 +471,21 @@ impl Reflection<'_> {
     fn add_up(&self, incident: &[Incident], direction: Vec3) -> Rgb {
         let outgoing = self.place.local(direction);
         if self.around {
-            around::reflect(incident, outgoing, |incident, outgoing| self.material.reflect(incident, outgoing))
+            let (incident, outgoing) = around::seen(incident, outgoing);
+            self.material.reflect(&incident, outgoing)
         } else {
             self.material.reflect(incident, outgoing)
+        }
+    }
+
+    /// What it makes of each of them.
+    fn each(&self, incident: &[Incident], direction: Vec3, reflected: &mut [Rgb]) {
+        let outgoing = self.place.local(direction);
+        if self.around {
+            let (incident, outgoing) = around::seen(incident, outgoing);
+            self.material.reflect_each(&incident, outgoing, reflected);
+        } else {
+            self.material.reflect_each(incident, outgoing, reflected);
         }
     }
 
@@ -539,6 +561,10 @@ impl Superposition for Lobes<'_> {
 
     fn add_up(&self, samples: &[Incident], direction: Vec3) -> Rgb {
         self.reflection.add_up(samples, direction)
+    }
+
+    fn each(&self, samples: &[Incident], direction: Vec3, values: &mut [Rgb]) {
+        self.reflection.each(samples, direction, values);
     }
 
     fn value(&self, direction: Vec3, sum: Rgb) -> Rgb {

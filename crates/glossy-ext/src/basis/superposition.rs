@@ -20,6 +20,13 @@ pub trait Superposition {
     /// Some terms in a unit direction, added up.
     fn add_up(&self, terms: &[Self::Term], direction: Vec3) -> Rgb;
 
+    /// Each of some terms in a unit direction: as many values as terms.
+    fn each(&self, terms: &[Self::Term], direction: Vec3, values: &mut [Rgb]) {
+        for (term, value) in std::iter::zip(terms, values) {
+            *value = self.add_up(std::slice::from_ref(term), direction);
+        }
+    }
+
     /// The value of the function in a unit direction where the terms add up to `sum`.
     fn value(&self, direction: Vec3, sum: Rgb) -> Rgb;
 

@@ -148,6 +148,16 @@ pub enum Fault {
         /// Where.
         at: Pair,
     },
+    /// `reflect_each` does not tell what `reflect_sum` adds up.
+    #[error("`reflect_each` gives {value} at {at}, but `reflect_sum` of that sender alone is {expected}")]
+    Each {
+        /// What it returned.
+        value: Rgb,
+        /// What it should.
+        expected: Rgb,
+        /// Where.
+        at: Pair,
+    },
     /// `reflect_sum` is not the sum over its samples.
     #[error(
         "`reflect_sum` is {value} toward {}, but `glossy_toward_extent` × irradiance sums to {expected}",

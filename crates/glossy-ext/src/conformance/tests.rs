@@ -94,6 +94,7 @@ enum Wrong {
     Extent,
     ExtentMean,
     Sum,
+    Each,
     Bound,
     NoLobe,
     LobeDirection,
@@ -151,6 +152,13 @@ impl Reflector for Broken {
     fn reflect_sum(&self, incident: &[Incident], o: Vec3) -> Rgb {
         let incident = if self.1 == Wrong::Sum { &incident[1..] } else { incident };
         incident.iter().map(|s| self.glossy_toward_extent(s.direction, o, s.extent) * s.irradiance).sum()
+    }
+
+    fn reflect_each(&self, incident: &[Incident], o: Vec3, reflected: &mut [Rgb]) {
+        let factor = if self.1 == Wrong::Each { 0.9 } else { 1.0 };
+        for (sender, reflected) in std::iter::zip(incident, reflected) {
+            *reflected = factor * self.reflect_sum(std::slice::from_ref(sender), o);
+        }
     }
 
     fn glossy_bound(&self, cone: &Cone, o: Vec3) -> f32 {
@@ -214,6 +222,7 @@ fn broken_reflectors_are_caught_with_the_right_words() {
         (Wrong::Extent, "for a sender of 0 rad"),
         (Wrong::ExtentMean, "but the mean of `glossy` over it is"),
         (Wrong::Sum, "`reflect_sum` is"),
+        (Wrong::Each, "`reflect_each` gives"),
         (Wrong::Bound, "samples that matter would be skipped"),
         (Wrong::NoLobe, "the width NaN; a unit vector with z ≥ 0"),
         (Wrong::LobeDirection, "`lobe` is off"),

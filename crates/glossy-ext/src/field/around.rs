@@ -4,7 +4,6 @@
 //! where the middle would mirror it ([`Outgoing`](crate::outgoing::Outgoing)). That may come from below the middle's horizon. So light
 //! from all around is reflected, that which the middle would see at a low angle or not at all as by a place that sees it at this angle.
 
-use crate::Rgb;
 use crate::reflector::{Contour, Incident};
 use crate::samples::Place;
 use glam::Vec3;
@@ -28,8 +27,9 @@ pub(super) fn all(upper: Vec<Incident>, lower: Vec<Incident>, turned: impl Fn(Ve
     upper.chain(lower).collect()
 }
 
-/// What `reflector` makes of such samples toward where the middle would mirror it.
-pub(super) fn reflect(all: &[Incident], outgoing: Vec3, reflector: impl Fn(&[Incident], Vec3) -> Rgb) -> Rgb {
+/// Such samples as a place sees them that mirrors them toward where the middle would mirror them, and that direction, both in its
+/// frame. Those below its horizon are dark.
+pub(super) fn seen(all: &[Incident], outgoing: Vec3) -> (Vec<Incident>, Vec3) {
     let seen = Vec3::new(-outgoing.x, -outgoing.y, outgoing.z);
     let normal = if seen.z >= LEAST {
         Vec3::Z
@@ -38,21 +38,24 @@ pub(super) fn reflect(all: &[Incident], outgoing: Vec3, reflector: impl Fn(&[Inc
         (seen * LEAST + up * SINE).normalize()
     };
     let place = Place::new(Vec3::ZERO, normal);
-    let arriving: Vec<Incident> = all
-        .iter()
-        .filter_map(|sample| {
-            let direction = place.local(sample.direction);
-            let irradiance = sample.irradiance * direction.z;
-            (direction.z > 0.0).then_some(Incident { direction, irradiance, ..*sample })
-        })
-        .collect();
-    reflector(&arriving, place.local(-seen.reflect(normal)))
+    let arriving = all.iter().map(|sample| {
+        let direction = place.local(sample.direction);
+        Incident { direction, irradiance: sample.irradiance * direction.z.max(0.0), ..*sample }
+    });
+    (arriving.collect(), place.local(-seen.reflect(normal)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Rgb;
     use crate::reflector::{Reflector, Ward};
+
+    /// What chrome makes of samples toward where the middle would mirror it.
+    fn mirrored(all: &[Incident], outgoing: Vec3) -> f32 {
+        let (incident, outgoing) = seen(all, outgoing);
+        chrome().reflect_sum(&incident, outgoing).x
+    }
 
     /// Directions all over the sphere.
     fn sphere(count: u16) -> impl Iterator<Item = Vec3> {
@@ -77,7 +80,7 @@ mod tests {
             |direction| Incident { direction, extent, irradiance: Rgb::splat(solid_angle), ..Incident::default() };
         let sky: Vec<Incident> = sphere(COUNT).map(sample).collect();
         for outgoing in sphere(100) {
-            let light = reflect(&sky, outgoing, |incident, outgoing| chrome().reflect_sum(incident, outgoing)).x;
+            let light = mirrored(&sky, outgoing);
             assert!((light / 0.8 - 1.0).abs() < 0.12, "{light} toward {outgoing}");
         }
     }
@@ -89,8 +92,7 @@ mod tests {
         let lamps = all(Vec::new(), vec![lamp], |direction| direction * Vec3::new(1.0, 1.0, -1.0));
         assert_eq!(lamps[0].direction, Vec3::new(0.6, 0.0, -0.8), "below");
         assert!((lamps[0].irradiance.x - 1.0).abs() < 1e-6, "what arrives across the direction");
-        let toward =
-            |outgoing| reflect(&lamps, outgoing, |incident, outgoing| chrome().reflect_sum(incident, outgoing)).x;
+        let toward = |outgoing| mirrored(&lamps, outgoing);
         let peak = toward(Vec3::new(-0.6, 0.0, -0.8));
         let brightest = sphere(2000).max_by(|a, b| toward(*a).total_cmp(&toward(*b))).expect("some");
         assert!(brightest.dot(Vec3::new(-0.6, 0.0, -0.8)) > 0.997, "the highlight is at {brightest}");

@@ -110,14 +110,11 @@ impl<'a, S: Superposition> Terms<'a, S> {
         if !self.is_partible(active) {
             return (self.sum.value(direction, others + self.sum.add_up(terms, direction)), Found::NOTHING);
         }
-        let found = Found { active: [active.first, active.end], values: self.values.len() as u32 };
-        let mut all = others;
-        for term in terms {
-            let value = self.sum.add_up(std::slice::from_ref(term), direction);
-            all += value;
-            self.values.push(value);
-        }
-        (self.sum.value(direction, all), found)
+        let first = self.values.len();
+        self.values.resize(first + terms.len(), Rgb::ZERO);
+        self.sum.each(terms, direction, &mut self.values[first..]);
+        let found = Found { active: [active.first, active.end], values: first as u32 };
+        (self.sum.value(direction, others + self.values[first..].iter().sum::<Rgb>()), found)
     }
 
     /// The value of a term at a point.

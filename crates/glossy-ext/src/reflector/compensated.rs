@@ -1,7 +1,6 @@
 //! Metallic-roughness with all the light that microfacets pass on.
 
 use super::error::clamped;
-use super::extent::Disk;
 use super::generic::albedo_by_samples;
 use super::ggx::{directional_albedo, mean_fresnel};
 use super::half_vector::cosine_range;
@@ -112,6 +111,14 @@ impl Compensated {
         Self { single: single.without_diffuse(), further, matte, losses }
     }
 
+    /// Calls `each` with the place of every sender that is above the horizon and what its irradiance is multiplied by.
+    #[inline]
+    fn reflect_with(&self, incident: &[Incident], outgoing: Vec3, mut each: impl FnMut(usize, Rgb)) {
+        let out = self.losses.at(outgoing.z);
+        // Losses are almost linear in the cosine over any disk.
+        self.single.reflect_with(incident, outgoing, |k, lobe, mean_cos| each(k, lobe + self.rest(mean_cos, out)));
+    }
+
     /// The terms beside the lobe, less the Lambertian share.
     #[inline]
     fn rest(&self, cos_i: f32, out: Vec2) -> Rgb {
@@ -140,26 +147,19 @@ impl Reflector for Compensated {
     }
 
     fn glossy_toward_extent(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> Rgb {
-        match Disk::new(incident, extent) {
-            // Losses are almost linear in the cosine over any disk.
-            Some(disk) if above(outgoing) => {
-                self.single.glossy_toward_extent(incident, outgoing, extent)
-                    + self.rest(disk.mean_cos, self.losses.at(outgoing.z))
-            }
-            _ => Rgb::ZERO,
-        }
+        let sender = Incident { direction: incident, extent, irradiance: Rgb::ONE, ..Incident::default() };
+        self.reflect_sum(&[sender], outgoing)
     }
 
     fn reflect_sum(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
-        if !above(outgoing) {
-            return Rgb::ZERO;
-        }
-        let out = self.losses.at(outgoing.z);
-        let mut rest = Rgb::ZERO;
-        let lobes = self.single.reflect_each(incident, outgoing, |sample, disk| {
-            rest += sample.irradiance * self.rest(disk.mean_cos, out);
-        });
-        lobes + rest
+        let mut sum = Rgb::ZERO;
+        self.reflect_with(incident, outgoing, |k, factor| sum += incident[k].irradiance * factor);
+        sum
+    }
+
+    fn reflect_each(&self, incident: &[Incident], outgoing: Vec3, reflected: &mut [Rgb]) {
+        reflected.fill(Rgb::ZERO);
+        self.reflect_with(incident, outgoing, |k, factor| reflected[k] = incident[k].irradiance * factor);
     }
 
     fn glossy_bound(&self, incident: &Cone, outgoing: Vec3) -> f32 {

@@ -10,6 +10,7 @@
 use super::HORIZON;
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_2_SQRT_PI, FRAC_PI_4};
+use wide::f32x4;
 
 /// Contour of a flat sender: a trapezoid about its middle, the directions of
 /// middle + s (1 − taper t) across + (t + taper/3) along, for −1 ≤ s, t ≤ 1, the middle's being of unit length.
@@ -275,25 +276,23 @@ impl Trapezoid {
                 - 2.0 * fall * (s * u.length_squared() + t * v.length_squared());
             return fall * fall * (1.0 + curvature);
         }
-        let (wide, narrow) = (self.across * (1.0 + self.taper), self.across * (1.0 - self.taper));
+        // Edges side by side: signs of `along` and shares of `across` at the corner that each starts from and that it ends at.
+        let (wide, narrow) = (1.0 + self.taper, 1.0 - self.taper);
         let base = self.middle + self.along * (self.taper / 3.0);
-        let corners = [
-            base - self.along - wide,
-            base - self.along + wide,
-            base + self.along + narrow,
-            base + self.along - narrow,
-        ];
-        let mut sum = 0.0;
-        for (k, &from) in corners.iter().enumerate() {
-            let edge = corners[(k + 1) % 4] - from;
-            let length2 = edge.length_squared();
-            if length2 > 0.0 {
-                let length = length2.sqrt();
-                let (distance, start) = (from.perp_dot(edge) / length, from.dot(edge) / length);
-                let root = (1.0 + distance * distance).sqrt();
-                sum += distance / root * (length * root).atan2(root * root + start * (start + length));
-            }
-        }
+        let corners = |signs: [f32; 4], shares: [f32; 4]| {
+            let (signs, shares) = (f32x4::new(signs), f32x4::new(shares));
+            let at = |axis: usize| base[axis] + self.along[axis] * signs + self.across[axis] * shares;
+            (at(0), at(1))
+        };
+        let (x, y) = corners([-1.0, -1.0, 1.0, 1.0], [-wide, wide, narrow, -narrow]);
+        let (to_x, to_y) = corners([-1.0, 1.0, 1.0, -1.0], [wide, narrow, -narrow, -wide]);
+        let (edge_x, edge_y) = (to_x - x, to_y - y);
+        let length2 = edge_x * edge_x + edge_y * edge_y;
+        let length = length2.sqrt();
+        let (distance, start) = ((x * edge_y - y * edge_x) / length, (x * edge_x + y * edge_y) / length);
+        let root = (1.0 + distance * distance).sqrt();
+        let angle = (length * root).atan2(root * root + start * (start + length));
+        let sum = (length2.simd_gt(f32x4::ZERO) & (distance / root * angle)).reduce_add();
         0.5 * sum.abs() / self.area()
     }
 }

@@ -1,14 +1,15 @@
 //! The parts of the GGX model: Schlick's Fresnel factor, the distribution of Trowbridge and Reitz, Smith's
 //! height-correlated masking, and visible normals.
 
+use super::lanes::Number;
 use super::{above, unit};
 use glam::{DVec2, Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, TAU};
 
-/// (1 − V·H)⁵ from h = V + L, not normalised: V·H is half its length.
+/// (1 − V·H)⁵ from h = V + L, not normalised: V·H is half its length, of which the square is given.
 #[inline]
-pub(super) fn schlick(h: Vec3) -> f32 {
-    let m = (1.0 - 0.5 * h.length()).max(0.0);
+pub(super) fn schlick<N: Number>(length2: N) -> N {
+    let m = (length2.sqrt() * -0.5 + 1.0).at_least(0.0);
     let m2 = m * m;
     m2 * m2 * m
 }
@@ -23,15 +24,15 @@ pub(super) fn distribution(alpha: f32, h: Vec3) -> f32 {
 
 /// √(α² + (1 − α²) cos²).
 #[inline]
-pub(super) fn root(alpha: f32, cos: f32) -> f32 {
+pub(super) fn root<N: Number>(alpha: f32, cos: N) -> N {
     let alpha2 = alpha * alpha;
-    (alpha2 + (1.0 - alpha2) * cos * cos).max(0.0).sqrt()
+    (cos * cos * (1.0 - alpha2) + alpha2).at_least(0.0).sqrt()
 }
 
 /// G / (4 (V·N) (L·N)).
 #[inline]
-pub(super) fn visibility(alpha: f32, cos_i: f32, cos_o: f32) -> f32 {
-    0.5 / (cos_o * root(alpha, cos_i) + cos_i * root(alpha, cos_o))
+pub(super) fn visibility<N: Number>(alpha: f32, cos_i: N, cos_o: f32) -> N {
+    ((root(alpha, cos_i) * cos_o + cos_i * root(alpha, cos_o)) * 2.0).reciprocal()
 }
 
 /// A facet out of those visible from `outgoing` (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps",
@@ -67,7 +68,7 @@ pub(super) fn directional_albedo(alpha: f32, cos: f32, cells: usize) -> Vec2 {
         if let Some(incident) = draw(alpha, outgoing, u) {
             let weight =
                 2.0 * (outgoing.z + root(alpha, outgoing.z)) * visibility(alpha, incident.z, outgoing.z) * incident.z;
-            sum += Vec2::new(weight, weight * schlick(incident + outgoing)).as_dvec2();
+            sum += Vec2::new(weight, weight * schlick((incident + outgoing).length_squared())).as_dvec2();
         }
     }
     (sum / (cells * cells) as f64).as_vec2()

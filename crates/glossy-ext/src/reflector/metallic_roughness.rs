@@ -1,12 +1,13 @@
 //! The metallic-roughness model of glTF 2.0.
 
 use super::error::{ReflectorError, clamped, number, reflectance};
-use super::extent::{Disk, Meeting, ggx_over_disk};
+use super::extent::{Disks, Lobes, Meeting, Meetings, ggx_over_disk};
 use super::generic::albedo_by_samples;
 use super::ggx::{density, distribution, draw, mean_albedo, schlick, visibility};
 use super::half_vector::HalfRange;
+use super::lanes::{Directions, LANES, Lanes, Number};
 use super::ward::slope_to_width;
-use super::{Compensated, Contour, Formula, Incident, Lobe, Reflector, Sample, above, cosine_hemisphere, mirrored};
+use super::{Compensated, Formula, Incident, Lobe, Reflector, Sample, above, cosine_hemisphere, mirrored};
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
 use std::f32::consts::FRAC_1_PI;
@@ -92,79 +93,30 @@ impl MetallicRoughness {
         }
     }
 
-    /// The lobe D G / (4 (V·N) (L·N)) averaged over a disk, w for it, and w averaged over the disk.
+    /// Calls `each` with the place of every sender that is above the horizon, what its irradiance is multiplied by, and its mean cosine.
     #[inline]
-    fn lobe_over_disk(&self, disk: &Disk, outgoing: Vec3) -> (f32, f32, f32) {
-        if disk.radius2 == 0.0 {
-            let (lobe, w) = self.lobe_toward(disk.middle, outgoing);
-            return (lobe, w, w);
+    pub(super) fn reflect_with(&self, incident: &[Incident], outgoing: Vec3, mut each: impl FnMut(usize, Rgb, f32)) {
+        if above(outgoing) {
+            self.over(incident, outgoing, |k, Lit { lobe, w, mean_w, mean_cos }| {
+                if mean_cos > 0.0 {
+                    each(k, self.shade(lobe, w, mean_w), mean_cos);
+                }
+            });
         }
-        let alpha2 = self.alpha * self.alpha;
-        // A Gaussian with the relative slope of the density at hand.
-        let meeting = Meeting::new(disk, outgoing, Vec2::ONE, |tan2| 0.25 * (alpha2 + tan2));
-        let (root, _) = meeting.rounded(alpha2, 1.0);
-        // Far out the density changes slowly, and the ellipse's shape matters less.
-        let (_, squared) = meeting.rounded(alpha2 + meeting.tan2, 1.0);
-        let density = ggx_over_disk(squared / alpha2, (root - alpha2) / alpha2) * (FRAC_1_PI / alpha2);
-        (self.at_meeting(&meeting, density, outgoing), schlick(meeting.h), schlick(disk.middle + outgoing))
     }
 
-    /// The same averaged over a contour, where it has one that shows.
+    /// D where a lobe meets a sender, over which its density of slopes is this: that / cos⁴.
     #[inline]
-    fn lobe_over(&self, disk: &Disk, contour: &Contour, outgoing: Vec3) -> (f32, f32, f32) {
-        let alpha2 = self.alpha * self.alpha;
-        // Far out the density changes slowly.
-        let h = disk.middle + outgoing;
-        let width2 = alpha2 + (h.x * h.x + h.y * h.y) / (h.z * h.z);
-        if contour.reach() == 0.0 || !contour.shows(disk.middle, width2.sqrt()) {
-            return self.lobe_over_disk(disk, outgoing);
-        }
-        let variance = |tan2: f32| 0.25 * (alpha2 + tan2);
-        // By 1/cos⁴ of the half vector: 1/2 seen head on, more at other angles.
-        const RISE: f32 = 1.0;
-        let (meeting, outline) = Meeting::within((disk, contour), outgoing, Vec2::ONE, variance, RISE);
-        let density = outline.scaled(self.alpha.recip()).ggx() * (FRAC_1_PI / alpha2);
-        (self.at_meeting(&meeting, density, outgoing), schlick(meeting.h), schlick(h))
-    }
-
-    /// [`Reflector::reflect_sum`]; `each` is told of every sample that is above the horizon what is visible of it.
-    #[inline]
-    pub(super) fn reflect_each(
-        &self,
-        incident: &[Incident],
-        outgoing: Vec3,
-        mut each: impl FnMut(&Incident, &Disk),
-    ) -> Rgb {
-        if !above(outgoing) {
-            return Rgb::ZERO;
-        }
-        // Everything is linear in three numbers per sample; colours come last.
-        let (mut head_on, mut grazing, mut matte) = (Rgb::ZERO, Rgb::ZERO, Rgb::ZERO);
-        for sample in incident {
-            if let Some(disk) = Disk::new(sample.direction, sample.extent) {
-                let (lobe, w, mean_w) = self.lobe_over(&disk, &sample.contour, outgoing);
-                head_on += sample.irradiance * (lobe * (1.0 - w));
-                grazing += sample.irradiance * (lobe * w);
-                matte += sample.irradiance * (MEAN_W - mean_w);
-                each(sample, &disk);
-            }
-        }
-        self.f0 * head_on + grazing + self.matte * (1.0 - DIELECTRIC_F0) * matte
-    }
-
-    /// The lobe where it meets a sender, over which its density of slopes is this.
-    #[inline]
-    fn at_meeting(&self, meeting: &Meeting, density: f32, outgoing: Vec3) -> f32 {
-        // D is the density of slopes / cos⁴.
-        let inv_cos2 = 1.0 + meeting.tan2;
-        density * meeting.weight * inv_cos2 * inv_cos2 * visibility(self.alpha, meeting.incident.z, outgoing.z)
+    fn density<N: Number>(density: N, tan2: N) -> N {
+        let inv_cos2 = tan2 + 1.0;
+        density * inv_cos2 * inv_cos2
     }
 
     /// The lobe and w toward a point.
     #[inline]
     fn lobe_toward(&self, incident: Vec3, outgoing: Vec3) -> (f32, f32) {
         let h = incident + outgoing;
-        (distribution(self.alpha, h) * visibility(self.alpha, incident.z, outgoing.z), schlick(h))
+        (distribution(self.alpha, h) * visibility(self.alpha, incident.z, outgoing.z), schlick(h.length_squared()))
     }
 
     /// The glossy part out of the lobe and w.
@@ -177,6 +129,69 @@ impl MetallicRoughness {
     #[inline]
     fn remainder(&self, w: f32) -> Rgb {
         self.matte * ((1.0 - DIELECTRIC_F0) * (MEAN_W - w))
+    }
+}
+
+/// What a sender makes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Lit {
+    /// D G / (4 (V·N) (L·N)) averaged over it.
+    lobe: f32,
+    /// w for that …
+    w: f32,
+    /// … and averaged over it.
+    mean_w: f32,
+    /// Its mean cosine; 0 below the horizon.
+    mean_cos: f32,
+}
+
+impl Lobes for MetallicRoughness {
+    type Light = Lit;
+
+    #[inline]
+    fn alone(&self, sender: &Incident, outgoing: Vec3) -> Option<Lit> {
+        let Incident { direction, contour, .. } = sender;
+        if contour.reach() == 0.0 {
+            return None;
+        }
+        let alpha2 = self.alpha * self.alpha;
+        // Far out the density changes slowly.
+        let h = *direction + outgoing;
+        let width2 = alpha2 + (h.x * h.x + h.y * h.y) / (h.z * h.z);
+        if !contour.shows(*direction, width2.sqrt()) {
+            return None;
+        }
+        let variance = |tan2: f32| 0.25 * (alpha2 + tan2);
+        // By 1/cos⁴ of the half vector: 1/2 seen head on, more at other angles.
+        const RISE: f32 = 1.0;
+        let meeting = Meeting::new((*direction, contour), outgoing, Vec2::ONE, variance, RISE);
+        let density = meeting.outline.scaled(self.alpha.recip()).ggx() * (FRAC_1_PI / alpha2);
+        let visibility = visibility(self.alpha, meeting.incident.z, outgoing.z);
+        Some(Lit {
+            lobe: Self::density(density, meeting.tan2) * meeting.weight * visibility,
+            w: schlick(meeting.h.length_squared()),
+            mean_w: schlick(h.length_squared()),
+            mean_cos: direction.z,
+        })
+    }
+
+    #[inline]
+    fn together(&self, disks: &Disks, outgoing: Vec3) -> [Lit; LANES] {
+        let alpha2 = self.alpha * self.alpha;
+        // A Gaussian with the relative slope of the density at hand.
+        let meeting = Meetings::new(disks, outgoing, Vec2::ONE, |tan2| 0.25 * (alpha2 + tan2));
+        let (root, _) = meeting.rounded(Lanes::splat(alpha2), 1.0);
+        // Far out the density changes slowly, and the ellipse's shape matters less.
+        let (_, squared) = meeting.rounded(alpha2 + meeting.tan2, 1.0);
+        let per = alpha2.recip();
+        let density = ggx_over_disk(squared * per, (root - alpha2) * per) * (FRAC_1_PI * per);
+        let visibility = visibility(self.alpha, meeting.incident.z, outgoing.z);
+        let lobe = Self::density(density, meeting.tan2) * meeting.weight * visibility;
+        let toward_middle = disks.middle + Directions::splat(outgoing);
+        let w = schlick(meeting.h.length_squared()).to_array();
+        let mean_w = schlick(toward_middle.length_squared()).to_array();
+        let [lobe, mean_cos] = [lobe, disks.mean_cos].map(|values| disks.of_visible(values).to_array());
+        std::array::from_fn(|k| Lit { lobe: lobe[k], w: w[k], mean_w: mean_w[k], mean_cos: mean_cos[k] })
     }
 }
 
@@ -204,17 +219,19 @@ impl Reflector for MetallicRoughness {
     }
 
     fn glossy_toward_extent(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> Rgb {
-        match Disk::new(incident, extent) {
-            Some(disk) if above(outgoing) => {
-                let (lobe, w, mean_w) = self.lobe_over_disk(&disk, outgoing);
-                self.shade(lobe, w, mean_w)
-            }
-            _ => Rgb::ZERO,
-        }
+        let sender = Incident { direction: incident, extent, irradiance: Rgb::ONE, ..Incident::default() };
+        self.reflect_sum(&[sender], outgoing)
     }
 
     fn reflect_sum(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
-        self.reflect_each(incident, outgoing, |_, _| {})
+        let mut sum = Rgb::ZERO;
+        self.reflect_with(incident, outgoing, |k, factor, _| sum += incident[k].irradiance * factor);
+        sum
+    }
+
+    fn reflect_each(&self, incident: &[Incident], outgoing: Vec3, reflected: &mut [Rgb]) {
+        reflected.fill(Rgb::ZERO);
+        self.reflect_with(incident, outgoing, |k, factor, _| reflected[k] = incident[k].irradiance * factor);
     }
 
     fn glossy_bound(&self, incident: &Cone, outgoing: Vec3) -> f32 {
@@ -228,7 +245,7 @@ impl Reflector for MetallicRoughness {
         let d = alpha2 * FRAC_1_PI * ratio * ratio;
         let lobe = d * visibility(self.alpha, range.z_low - outgoing.z, outgoing.z);
         // |h|² = 2 (1 + V·L).
-        let w_of = |cos: f32| schlick(Vec3::new(0.0, 0.0, (2.0 * (1.0 + cos)).max(0.0).sqrt()));
+        let w_of = |cos: f32| schlick((2.0 * (1.0 + cos)).max(0.0));
         let (w_low, w_high) = (w_of(range.cos_high), w_of(range.cos_low));
         let fresnel = self.f0 * (1.0 - w_high) + Rgb::splat(w_high);
         let above = fresnel * lobe + self.remainder(w_low).max(Rgb::ZERO);

@@ -30,6 +30,7 @@ mod generic;
 mod ggx;
 mod half_vector;
 mod lambert;
+mod lanes;
 mod merl;
 mod metallic_roughness;
 mod phong;
@@ -175,6 +176,13 @@ pub trait Reflector: Debug + Send + Sync {
         incident.iter().fold(Rgb::ZERO, |sum, sample| {
             sum + self.glossy_toward_extent(sample.direction, outgoing, sample.extent) * sample.irradiance
         })
+    }
+
+    /// What each of many senders makes alone, as [`reflect_sum`](Self::reflect_sum) adds it up, in their order; as many values as senders.
+    fn reflect_each(&self, incident: &[Incident], outgoing: Vec3, reflected: &mut [Rgb]) {
+        for (sender, reflected) in std::iter::zip(incident, reflected) {
+            *reflected = self.reflect_sum(std::slice::from_ref(sender), outgoing);
+        }
     }
 
     /// Upper bound of the magnitude of every channel of [`glossy`](Self::glossy) over all incident directions in a

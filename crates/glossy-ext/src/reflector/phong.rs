@@ -1,9 +1,10 @@
 //! Phong's reflection model, energy-normalised.
 
 use super::error::{ReflectorError, clamped, number, reflectance};
-use super::extent::{Disk, gaussian_over_disk};
+use super::extent::{Disks, Lobes, gaussian_over_disk};
 use super::generic::albedo_by_samples;
 use super::half_vector::cosine_range;
+use super::lanes::{Directions, LANES, Lanes, Number};
 use super::{Contour, Formula, HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
@@ -49,37 +50,19 @@ impl Phong {
         self.ks * ((self.n + 2.0) / TAU)
     }
 
-    /// cosⁿ averaged over a sender; `mirror` is the mirrored outgoing direction, above the horizon.
+    /// Calls `each` with the place of every sender that matters, and its lobe.
     #[inline]
-    fn lobe_over(&self, sample: &Incident, mirror: Vec3) -> f32 {
-        let Incident { direction, extent, contour, .. } = sample;
-        // Distances, not cosines, keep high exponents exact. cosⁿ ψ is below exp(−n ψ²/2).
-        let nearest = sample.reach() + self.cut;
-        if direction.distance_squared(mirror) > nearest * nearest {
-            return 0.0;
+    fn reflect_with(&self, incident: &[Incident], outgoing: Vec3, mut each: impl FnMut(usize, f32)) {
+        if !self.is_diffuse() && above(outgoing) {
+            self.over(incident, mirrored(outgoing), |k, lobe| {
+                if lobe > 0.0 {
+                    each(k, lobe);
+                }
+            });
         }
-        let Some(disk) = Disk::new(*direction, *extent) else { return 0.0 };
-        let apart = mirror - disk.middle;
-        let versine = 0.5 * apart.length_squared();
-        if versine >= 1.0 {
-            return 0.0;
-        }
-        // In slopes of half vectors, which turn by half of what directions do, the lobe is half as wide.
-        if contour.shows(*direction, (0.5 / self.n).sqrt()) {
-            return self.lobe_over_contour(*direction, contour, mirror);
-        }
-        let exponent = -self.n * (-versine).ln_1p();
-        if disk.radius2 == 0.0 {
-            return (-exponent).exp();
-        }
-        // The cosine is taken where the lobe and the disk meet: both are like Gaussians, of variances 1/n and r²/4.
-        let share = 0.25 * disk.radius2 * self.n;
-        let step = (share / (1.0 + share)).min((disk.radius2 / (2.0 * versine)).sqrt());
-        let cos = disk.middle.z + step * apart.z;
-        cos / disk.mean_cos * gaussian_over_disk(exponent, 2.0 * share)
     }
 
-    /// The same for a sender with a contour that shows.
+    /// cosⁿ averaged over a sender with a contour that shows; `mirror` is the mirrored outgoing direction, above the horizon.
     // Inlined it would make disks half as fast.
     #[inline(never)]
     fn lobe_over_contour(&self, direction: Vec3, contour: &Contour, mirror: Vec3) -> f32 {
@@ -93,6 +76,41 @@ impl Phong {
         let versine = 0.5 * met.incident.distance_squared(mirror);
         let at = flat(met.incident) * (1.0 + versine * (0.5 + 0.29 * versine));
         met.weight(direction.z, 0.0) * met.mapped(at, [0.0; 2], Vec2::ZERO, flat).gaussian()
+    }
+}
+
+/// cosⁿ averaged over senders; the mirrored outgoing direction, above the horizon, is given in the place of the outgoing one.
+impl Lobes for Phong {
+    type Light = f32;
+
+    #[inline]
+    fn alone(&self, sender: &Incident, mirror: Vec3) -> Option<f32> {
+        let Incident { direction, contour, .. } = sender;
+        // Distances, not cosines, keep high exponents exact. cosⁿ ψ is below exp(−n ψ²/2).
+        let (nearest, distance2) = (sender.reach() + self.cut, direction.distance_squared(mirror));
+        if distance2 > nearest * nearest {
+            return Some(0.0);
+        }
+        // In slopes of half vectors, which turn by half of what directions do, the lobe is half as wide.
+        if !contour.shows(*direction, (0.5 / self.n).sqrt()) {
+            return None;
+        }
+        Some(if distance2 < 2.0 { self.lobe_over_contour(*direction, contour, mirror) } else { 0.0 })
+    }
+
+    #[inline]
+    fn together(&self, disks: &Disks, mirror: Vec3) -> [f32; LANES] {
+        let apart = Directions::splat(mirror) - disks.middle;
+        let versine = 0.5 * apart.length_squared();
+        let is_before = versine.simd_lt(Lanes::ONE);
+        let exponent = -self.n * (-is_before.select(versine, Lanes::ZERO)).ln_1p();
+        // The cosine is taken where the lobe and the disk meet: both are like Gaussians, of variances 1/n and r²/4.
+        let share = 0.25 * self.n * disks.radius2;
+        let inside = (disks.radius2 / (2.0 * versine.at_least(f32::MIN_POSITIVE))).sqrt();
+        let step = (share / (1.0 + share)).fast_min(inside);
+        let cos = disks.middle.z + step * apart.z;
+        let lobe = cos / disks.mean_cos * gaussian_over_disk(exponent, 2.0 * share);
+        disks.of_visible(is_before & lobe).to_array()
     }
 }
 
@@ -156,27 +174,20 @@ impl Reflector for Phong {
     }
 
     fn glossy_toward_extent(&self, incident: Vec3, outgoing: Vec3, extent: f32) -> Rgb {
-        if above(outgoing) {
-            let sender = Incident { direction: incident, extent, irradiance: Rgb::ONE, ..Incident::default() };
-            self.scale() * self.lobe_over(&sender, mirrored(outgoing))
-        } else {
-            Rgb::ZERO
-        }
+        let sender = Incident { direction: incident, extent, irradiance: Rgb::ONE, ..Incident::default() };
+        self.reflect_sum(&[sender], outgoing)
     }
 
     fn reflect_sum(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
-        if self.is_diffuse() || !above(outgoing) {
-            return Rgb::ZERO;
-        }
-        let mirror = mirrored(outgoing);
         let mut sum = Rgb::ZERO;
-        for sample in incident {
-            let lobe = self.lobe_over(sample, mirror);
-            if lobe > 0.0 {
-                sum += sample.irradiance * lobe;
-            }
-        }
+        self.reflect_with(incident, outgoing, |k, lobe| sum += incident[k].irradiance * lobe);
         self.scale() * sum
+    }
+
+    fn reflect_each(&self, incident: &[Incident], outgoing: Vec3, reflected: &mut [Rgb]) {
+        let scale = self.scale();
+        reflected.fill(Rgb::ZERO);
+        self.reflect_with(incident, outgoing, |k, lobe| reflected[k] = incident[k].irradiance * (scale * lobe));
     }
 
     fn glossy_bound(&self, incident: &Cone, outgoing: Vec3) -> f32 {

@@ -71,6 +71,15 @@ impl Reflector for Sum {
         self.add(|part| part.reflect_sum(incident, outgoing))
     }
 
+    fn reflect_each(&self, incident: &[Incident], outgoing: Vec3, reflected: &mut [Rgb]) {
+        reflected.fill(Rgb::ZERO);
+        let mut parts = vec![Rgb::ZERO; reflected.len()];
+        for part in &self.parts {
+            part.reflect_each(incident, outgoing, &mut parts);
+            std::iter::zip(&mut *reflected, &parts).for_each(|(sum, part)| *sum += *part);
+        }
+    }
+
     fn glossy_bound(&self, incident: &Cone, outgoing: Vec3) -> f32 {
         self.parts.iter().map(|part| part.glossy_bound(incident, outgoing)).sum()
     }

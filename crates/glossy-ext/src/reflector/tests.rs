@@ -471,6 +471,36 @@ fn sums_are_sums_of_single_samples() {
     }
 }
 
+/// However many there are side by side, with an outline or without, each sender makes what it makes alone.
+#[test]
+fn senders_do_not_know_of_each_other() {
+    let outgoing = direction(0.5, 0.0);
+    let incident: Vec<_> = (0..61_u16)
+        .map(|k| {
+            let middle = direction(1.75 * (f32::from(k) / 61.0), 0.3 * f32::from(k));
+            let size = 0.004 * f32::from(k);
+            let (across, along) = middle.any_orthonormal_pair();
+            let contour = match k % 3 {
+                0 => Contour::new(middle, across * size, along * size, 0.2),
+                _ => Contour::NONE,
+            };
+            let extent = if k % 3 == 1 { 0.0 } else { size };
+            Incident { direction: middle, extent, contour, irradiance: Rgb::new(1.0, 0.5, 0.2), ..Incident::default() }
+        })
+        .collect();
+    for r in all() {
+        for count in [1, 7, 8, 9, 61] {
+            let mut each = vec![Rgb::NAN; count];
+            r.reflect_each(&incident[..count], outgoing, &mut each);
+            for (sender, value) in std::iter::zip(&incident, each) {
+                let alone = r.reflect_sum(std::slice::from_ref(sender), outgoing);
+                let off = (value - alone).abs().max_element();
+                assert!(off <= 1e-6 * alone.abs().max_element(), "{r:?}: {value}, alone {alone}");
+            }
+        }
+    }
+}
+
 #[test]
 fn parameters_are_checked() {
     let half = grey(0.5);

@@ -1,9 +1,10 @@
 //! Ward's reflection model with bounded albedo.
 
 use super::error::{ReflectorError, clamped, direction, number, reflectance};
-use super::extent::{Disk, Meeting, gaussian_over_disk};
+use super::extent::{Disks, Lobes, Meeting, Meetings, gaussian_over_disk};
 use super::generic::albedo_by_samples;
 use super::half_vector::HalfRange;
+use super::lanes::{LANES, Lanes, Number};
 use super::{Formula, HORIZON, Incident, Lobe, Reflector, Sample, above, mirrored, unit};
 use glam::{Vec2, Vec3};
 use hr_diffuse::{Cone, Rgb};
@@ -81,9 +82,9 @@ impl Ward {
         self.alpha >= Self::MIRROR_BELOW && self.rs != Rgb::ZERO
     }
 
-    /// What the lobe is multiplied by.
+    /// What the lobe is multiplied by; 0 where there is none.
     fn scale(&self) -> Rgb {
-        self.rs * (FRAC_1_PI / (self.alpha * self.alpha))
+        if self.has_lobe() { self.rs * (FRAC_1_PI / (self.alpha * self.alpha)) } else { Rgb::ZERO }
     }
 
     /// The lobe toward a point, without [`scale`](Self::scale).
@@ -96,50 +97,61 @@ impl Ward {
         (-stretched / (self.alpha * self.alpha)).exp() * (1.0 + tan2) * inv
     }
 
-    /// The lobe averaged over a sender, without [`scale`](Self::scale); `outgoing` is above the horizon. Where the
-    /// lobe is known to be `ROUND`, not stretching it costs nothing.
+    /// Calls `each` with the place of every sender that matters, and its lobe.
     #[inline]
-    fn lobe_over<const ROUND: bool>(&self, sample: &Incident, outgoing: Vec3) -> f32 {
-        let Incident { direction, extent, contour, .. } = sample;
-        let stretch = if ROUND { Vec2::ONE } else { self.stretch };
-        let alpha2 = self.alpha * self.alpha;
-        // No direction of the sender makes a half vector with a smaller slope than this.
-        let (h, reach) = (*direction + outgoing, sample.reach());
-        let nearest = reach * stretch.max_element() + CUT * self.alpha * (h.z + reach);
-        if (h.truncate() * stretch).length_squared() > nearest * nearest {
-            return 0.0;
+    fn reflect_with(&self, incident: &[Incident], outgoing: Vec3, mut each: impl FnMut(usize, f32)) {
+        if self.has_lobe() && above(outgoing) {
+            self.over(incident, outgoing, |k, lobe| {
+                if lobe > 0.0 {
+                    each(k, lobe);
+                }
+            });
         }
-        let Some(disk) = Disk::new(*direction, *extent) else { return 0.0 };
-        if disk.radius2 == 0.0 {
-            return self.lobe_toward(*direction, outgoing);
-        }
-        if contour.shows(*direction, self.alpha / stretch.max_element()) {
-            // By |h|²/h.z⁴, seen head on.
-            const RISE: f32 = 0.75;
-            let (meeting, outline) = Meeting::within((&disk, contour), outgoing, stretch, |_| 0.5 * alpha2, RISE);
-            let factor = meeting.weight * (1.0 + meeting.tan2) / (meeting.h.z * meeting.h.z);
-            return factor * outline.scaled(self.alpha.recip()).gaussian();
-        }
-        let meeting = Meeting::new(&disk, outgoing, stretch, |_| 0.5 * alpha2);
-        // A disk of radius r has the variance r²/4 per axis, the lobe α²/2; where one is slender against the other,
-        // twice the share comes closer to the mean over a strip.
-        let share = if ROUND { 0.5 } else { 1.0 };
-        let (root, squared) = meeting.rounded(alpha2, share);
-        let radius2 = (root - alpha2).max(0.0) / share;
-        let factor = meeting.weight * (1.0 + meeting.tan2) / (meeting.h.z * meeting.h.z);
-        factor * gaussian_over_disk(squared / alpha2, radius2 / alpha2)
     }
 
-    /// [`Reflector::reflect_sum`] without [`scale`](Self::scale).
-    fn sum<const ROUND: bool>(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
-        let mut sum = Rgb::ZERO;
-        for sample in incident {
-            let lobe = self.lobe_over::<ROUND>(sample, outgoing);
-            if lobe > 0.0 {
-                sum += sample.irradiance * lobe;
-            }
+    /// What the lobe is multiplied by where it meets a sender: the cosine and |h|²/h.z⁴.
+    #[inline]
+    fn factor<N: Number>(weight: N, tan2: N, half_z: N) -> N {
+        weight * (tan2 + 1.0) * (half_z * half_z).reciprocal()
+    }
+}
+
+/// The lobe averaged over senders, without [`scale`](Ward::scale).
+impl Lobes for Ward {
+    type Light = f32;
+
+    #[inline]
+    fn alone(&self, sender: &Incident, outgoing: Vec3) -> Option<f32> {
+        let Incident { direction, contour, .. } = sender;
+        // No direction of the sender makes a half vector with a smaller slope than this.
+        let (h, reach, most) = (*direction + outgoing, sender.reach(), self.stretch.max_element());
+        let nearest = reach * most + CUT * self.alpha * (h.z + reach);
+        if (h.truncate() * self.stretch).length_squared() > nearest * nearest {
+            return Some(0.0);
         }
-        sum
+        if !contour.shows(*direction, self.alpha / most) {
+            return None;
+        }
+        // By |h|²/h.z⁴, seen head on.
+        const RISE: f32 = 0.75;
+        let variance = 0.5 * self.alpha * self.alpha;
+        let meeting = Meeting::new((*direction, contour), outgoing, self.stretch, |_| variance, RISE);
+        let factor = Self::factor(meeting.weight, meeting.tan2, meeting.h.z);
+        Some(factor * meeting.outline.scaled(self.alpha.recip()).gaussian())
+    }
+
+    #[inline]
+    fn together(&self, disks: &Disks, outgoing: Vec3) -> [f32; LANES] {
+        let alpha2 = self.alpha * self.alpha;
+        let meeting = Meetings::new(disks, outgoing, self.stretch, |_| Lanes::splat(0.5 * alpha2));
+        // A disk of radius r has the variance r²/4 per axis, the lobe α²/2; where one is slender against the other,
+        // twice the share comes closer to the mean over a strip.
+        let share = if self.grain.is_none() { 0.5 } else { 1.0 };
+        let (root, squared) = meeting.rounded(Lanes::splat(alpha2), share);
+        let radius2 = (root - alpha2).at_least(0.0) * share.recip();
+        let factor = Self::factor(meeting.weight, meeting.tan2, meeting.h.z);
+        let per = alpha2.recip();
+        disks.of_visible(factor * gaussian_over_disk(squared * per, radius2 * per)).to_array()
     }
 }
 
@@ -209,12 +221,15 @@ impl Reflector for Ward {
     }
 
     fn reflect_sum(&self, incident: &[Incident], outgoing: Vec3) -> Rgb {
-        if !(self.has_lobe() && above(outgoing)) {
-            return Rgb::ZERO;
-        }
-        let is_round = self.grain.is_none();
-        let sum = if is_round { self.sum::<true>(incident, outgoing) } else { self.sum::<false>(incident, outgoing) };
+        let mut sum = Rgb::ZERO;
+        self.reflect_with(incident, outgoing, |k, lobe| sum += incident[k].irradiance * lobe);
         self.scale() * sum
+    }
+
+    fn reflect_each(&self, incident: &[Incident], outgoing: Vec3, reflected: &mut [Rgb]) {
+        let scale = self.scale();
+        reflected.fill(Rgb::ZERO);
+        self.reflect_with(incident, outgoing, |k, lobe| reflected[k] = incident[k].irradiance * (scale * lobe));
     }
 
     fn glossy_bound(&self, incident: &Cone, outgoing: Vec3) -> f32 {
