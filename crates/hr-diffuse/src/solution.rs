@@ -3,7 +3,7 @@
 use crate::clock::Instant;
 use crate::face_clusters::FaceClusters;
 use crate::hierarchy::{Elements, SceneData};
-use crate::hooks::{LightField, NodeId};
+use crate::hooks::{Arrived, LightField, NodeId};
 use crate::links::Links;
 use crate::reconstruct::reconstruct;
 use crate::resume::Unfinished;
@@ -13,6 +13,7 @@ use crate::transport::{Exitant, Light};
 use crate::vertices::Vertices;
 use crate::{Rgb, visibility::Hit};
 use glam::Vec2;
+use std::f32::consts::FRAC_1_PI;
 use std::ops::ControlFlow;
 
 /// Tells which leaves pictures show.
@@ -143,6 +144,17 @@ impl<L: LightField> Solution<L> {
     pub fn indirect_irradiance(&self, leaf: NodeId, uv: Vec2) -> Rgb {
         let corners = self.vertices.interpolation(leaf.0, uv);
         corners.iter().map(|&(vertex, weight)| self.vertices.indirect[vertex as usize] * weight).sum()
+    }
+
+    /// What the extension makes of all light that arrived at a leaf, as [`reflected`](Self::reflected) keeps it of those whose light
+    /// links asked for: found anew by each call. What differs by less than `negligible` (W/(m² sr)) makes no difference; the rest
+    /// may have this relative `error`.
+    #[must_use]
+    pub fn reflect(&self, leaf: NodeId, negligible: f32, error: f32) -> L::Exitant {
+        let irradiance = self.exitant.irradiance[leaf.index()];
+        let diffuse = irradiance * self.elements.nodes[leaf.index()].reflectance * FRAC_1_PI;
+        let arrived = Arrived { irradiance, diffuse, spread: 0.0, negligible, error, shown: false };
+        self.field.reflect(&self.elements, leaf, &self.incident_path(leaf), arrived)
     }
 
     /// What the extension keeps of the incident light of a leaf and of all its ancestors, the root first.

@@ -3,7 +3,7 @@
 
 use clap::ValueEnum;
 use glam::Vec3;
-use glossy_ext::{Basis, GlossyField, Incident, Place, Reflector, SHOWN_COSINE, arriving};
+use glossy_ext::{Basis, GlossyField, Incident, Outgoing, Place, Reflector, SHOWN_COSINE, arriving};
 use hr_diffuse::{LightField, NodeId, Rgb, Solution};
 use std::f32::consts::FRAC_1_PI;
 
@@ -29,9 +29,18 @@ pub enum Mode {
 /// The leaf's distribution is that of its middle, with the normal there. The middle sees the same in
 /// [another direction](glossy_ext::Focus::from_middle), and mirrors it to where its distribution is asked.
 pub(crate) fn leaving<B: Basis>(solution: &Solution<GlossyField<B>>, leaf: NodeId, at: Vec3, seen: Vec3) -> (Rgb, f32) {
+    leaving_as(solution, leaf, &solution.reflected[leaf.index()], (at, seen))
+}
+
+/// The same from a distribution that is given.
+pub(crate) fn leaving_as<B: Basis>(
+    solution: &Solution<GlossyField<B>>,
+    leaf: NodeId,
+    outgoing: &Outgoing<B>,
+    (at, seen): (Vec3, Vec3),
+) -> (Rgb, f32) {
     let element = &solution.elements.nodes[leaf.index()];
     let axis = element.normals.axis;
-    let outgoing = &solution.reflected[leaf.index()];
     let from_middle = outgoing.focus.from_middle(at - element.center, seen);
     let cosine = from_middle.dot(axis);
     let weight = (cosine / from_middle.length()).max(SHOWN_COSINE);

@@ -22,9 +22,11 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
+mod ends;
 mod shared;
 mod sight;
 
+use ends::Ends;
 use shared::{CORNERS, FIRST_LOBE_RAYS, LOBE_RAYS, Shaded, Shared, corners_first};
 use sight::Sight;
 
@@ -86,6 +88,8 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     glowing: Vec<u32>,
     /// By node, which emitters light it; found out of leaves where it is asked for.
     lights: Vec<OnceLock<Box<Lights>>>,
+    /// With distributions no lobe is followed.
+    ends: Option<Ends<B>>,
     even: AtomicU64,
     smooth: AtomicU64,
     half_shadows: AtomicU64,
@@ -104,6 +108,8 @@ pub struct Spared {
     /// Rays of pixels that met a place where all is known that may hide emitters: what is seen of these was cut out, and no ray sent to
     /// them.
     pub exact_shadows: u64,
+    /// Rays in lobes that ended at a leaf whose light no link had asked for, but one of these rays before.
+    pub known_ends: u64,
 }
 
 /// What is known of the emitters that light a leaf.
@@ -187,6 +193,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             tracer,
             glowing,
             lights,
+            ends: (mode != Mode::Distributions).then(|| Ends::new(solution)),
             even: AtomicU64::new(0),
             smooth: AtomicU64::new(0),
             half_shadows: AtomicU64::new(0),
@@ -228,7 +235,8 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let counts = [&self.even, &self.smooth, &self.half_shadows, &self.exact_shadows];
         let [even_pixels, smooth_pixels, half_shadows, exact_shadows] =
             counts.map(|count| count.load(Ordering::Relaxed));
-        Spared { even_pixels, smooth_pixels, half_shadows, exact_shadows }
+        let known_ends = self.ends.as_ref().map_or(0, Ends::spared);
+        Spared { even_pixels, smooth_pixels, half_shadows, exact_shadows, known_ends }
     }
 
     /// To be printed or not: rays by which a print has less noise do not enter the image.
@@ -471,8 +479,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             Mode::Samples | Mode::Gather
                 if self.solution.reflected[self.solution.faces.standing(leaf.0) as usize].is_empty() =>
             {
-                let (place, away) = (met.place(), met.away);
-                glossy::reflected(self.solution, &*met.reflector, leaf, &place, away, NARROWEST, &mut shared.incident)
+                self.by_itself(&met, shared)
             }
             Mode::Samples | Mode::Gather => self.interpolated(&met),
         };
@@ -572,6 +579,21 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         glossy::interpolated(self.solution, &corners, (met.hit.point, met.normal), met.away)
     }
 
+    /// The same from the distribution of the leaf itself, or from the samples that arrive where a texture says what is reflected.
+    fn by_itself(&self, met: &Met, shared: &mut Shared) -> Rgb {
+        if let Some(ends) = self.ends.as_ref().filter(|_| self.is_plain(met)) {
+            let leaf = NodeId(self.solution.faces.standing(met.leaf.0));
+            return ends.leaving(self.solution, leaf, (met.hit.point, glossy::mirrored(met.normal, met.away)));
+        }
+        let (place, away) = (met.place(), met.away);
+        glossy::reflected(self.solution, &*met.reflector, met.leaf, &place, away, NARROWEST, &mut shared.incident)
+    }
+
+    /// Whether a point reflects as its material does: there is no texture.
+    fn is_plain(&self, met: &Met) -> bool {
+        Arc::ptr_eq(&met.reflector, &self.material(&met.hit).reflector)
+    }
+
     /// Glossy radiance along rays, or from the samples that arrive at the point where the lobe is wide.
     fn reflected(&self, met: &Met, bounce: u32, sampler: &Sampler, shared: &mut Shared) -> Rgb {
         let mirror = met.reflector.mirror();
@@ -620,8 +642,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
 
     /// Whether the glossy light in the middle of a pixel stands for that of a point.
     fn is_same(&self, middle: &Shaded, met: &Met) -> bool {
-        let is_plain = Arc::ptr_eq(&met.reflector, &self.material(&met.hit).reflector);
-        is_plain
+        self.is_plain(met)
             && self.solution.faces.standing(met.leaf.0) == middle.cluster
             && middle.at.distance(met.hit.point) <= SAME_PLACE * self.solution.elements.nodes[met.leaf.index()].radius
             && middle.seen.distance(glossy::mirrored(met.normal, met.away)) <= SAME_DIRECTION * middle.width
@@ -742,6 +763,7 @@ mod tests {
     use glossy_ext::Lambert;
     use hr_diffuse::{Settings, Shape, Surface};
     use std::f64::consts::FRAC_1_SQRT_2;
+    use std::ops::ControlFlow;
 
     /// Where a quarter of the rays that look for edges meets what the pixel saw, the others bring next to nothing; so do all rays but one
     /// where one polygon is seen.
@@ -789,6 +811,44 @@ mod tests {
         let spared = caster.spared();
         assert!(spared.even_pixels > 100 && spared.smooth_pixels > 300, "{spared:?}");
         assert!(off < 2e-3 * light && most < 0.05, "{:.5} of the light, of a pixel {most}", off / light);
+    }
+
+    /// Where rays in lobes end, a leaf's own distribution is nearer to what rays from there find than what the samples make that arrive,
+    /// and is made once.
+    #[test]
+    fn leaves_at_ends_send_what_rays_find() {
+        const RAYS: u32 = 16;
+        let scene = Arc::new(Scene::load("glossy-sphere").expect("built in"));
+        let mut camera = scene.default_camera();
+        (camera.width, camera.height) = (45, 30);
+        let go_on = &mut |_: &_| ControlFlow::Continue(());
+        let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.1), false, go_on).expect("a sound scene");
+        let solution = &solved.solution;
+        let caster = RayCaster::new(&scene, solution, Mode::Samples);
+        let (eye, rays) = (solution.scene.normalization.to_unit(DVec3::from(camera.eye)), camera.rays());
+        let (mut light, mut shared, mut count) = ([0.0; 3], Shared::default(), 0);
+        for (x, y) in (0..30).flat_map(|y| (0..45).map(move |x| (x, y))) {
+            let direction = rays.within(x, y, Vec2::splat(0.5));
+            let hit = solution.scene.visibility.closest_except(eye, direction, START, f32::MAX, u32::MAX);
+            let Some((hit, leaf)) = hit.and_then(|hit| Some((hit, solution.leaf(&hit)?))) else { continue };
+            let reflector = Arc::clone(&caster.material(&hit).reflector);
+            let material = solution.elements.nodes[leaf.index()].material;
+            if reflector.is_diffuse() || solution.faint[material as usize] != Rgb::ZERO {
+                continue;
+            }
+            let met = caster.met(hit, leaf, direction, reflector);
+            let seed = hash(x as u32, y as u32);
+            let along = (0..RAYS).map(|i| caster.reflected(&met, 0, &Sampler::new(seed, i), &mut shared)).sum::<Rgb>();
+            let found =
+                [along / RAYS as f32, caster.by_itself(&met, &mut shared), caster.by_samples(&met, &mut shared)];
+            light.iter_mut().zip(found).for_each(|(sum, found)| *sum += found.element_sum());
+            count += 1;
+        }
+        let [along, leaves, samples] = light;
+        let off = [leaves, samples].map(|sum| (sum / along - 1.0).abs());
+        assert!(count > 300 && off[0] < 0.1 && off[0] < off[1], "of {count} points: {off:?}");
+        let known = caster.spared().known_ends;
+        assert!(known > 1000, "{known}");
     }
 
     /// A ground below slats that hide all but a fifth of a wide lamp, as of a sky behind blinds, and how a camera sees it.

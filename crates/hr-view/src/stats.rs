@@ -81,6 +81,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times, spared: Spared)
             "smooth_pixels": spared.smooth_pixels,
             "half_shadows": spared.half_shadows,
             "exact_shadows": spared.exact_shadows,
+            "known_ends": spared.known_ends,
             "shot_links": skipped.shot_links,
             "negligible_detail": solution.field.counters().negligible_detail(),
             "interpolated_samples": solution.field.counters().interpolated(),
