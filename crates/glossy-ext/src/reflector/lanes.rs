@@ -1,5 +1,5 @@
-//! Numbers, directions and points of a plane side by side, as processors compute them: a lobe is averaged over four senders in the time of
-//! one, as it takes a chain of square roots and quotients.
+//! Numbers, directions and points of a plane side by side, as processors compute them: a lobe is averaged over eight senders in little more
+//! than the time of one, as it takes a chain of square roots and quotients.
 
 use glam::{Vec2, Vec3};
 use std::ops::{Add, Mul, Sub};
