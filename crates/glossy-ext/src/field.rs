@@ -16,6 +16,7 @@ use albedos::Albedos;
 use glam::Vec3;
 use hr_diffuse::hooks::TYPICAL_LOBE;
 use hr_diffuse::{Arrived, Cone, Hierarchy, LightField, NodeId, Transfer};
+use std::borrow::Cow;
 use std::cell::Cell;
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -469,24 +470,24 @@ impl Reflection<'_> {
 
     /// What the reflector makes of samples toward a unit direction.
     fn add_up(&self, incident: &[Incident], direction: Vec3) -> Rgb {
-        let outgoing = self.place.local(direction);
-        if self.around {
-            let (incident, outgoing) = around::seen(incident, outgoing);
-            self.material.reflect(&incident, outgoing)
-        } else {
-            self.material.reflect(incident, outgoing)
-        }
+        let (incident, outgoing) = self.seen(incident, direction);
+        self.material.reflect(&incident, outgoing)
     }
 
     /// What it makes of each of them.
     fn each(&self, incident: &[Incident], direction: Vec3, reflected: &mut [Rgb]) {
+        let (incident, outgoing) = self.seen(incident, direction);
+        self.material.reflect_each(&incident, outgoing, reflected);
+    }
+
+    /// Samples and a unit direction in the frame in which they are reflected there.
+    fn seen<'s>(&self, incident: &'s [Incident], direction: Vec3) -> (Cow<'s, [Incident]>, Vec3) {
         let outgoing = self.place.local(direction);
-        if self.around {
-            let (incident, outgoing) = around::seen(incident, outgoing);
-            self.material.reflect_each(&incident, outgoing, reflected);
-        } else {
-            self.material.reflect_each(incident, outgoing, reflected);
+        if !self.around {
+            return (Cow::Borrowed(incident), outgoing);
         }
+        let (incident, outgoing) = around::seen(incident, outgoing);
+        (Cow::Owned(incident), outgoing)
     }
 
     /// What the leaf sends in a unit direction if the reflector makes this of all samples, and whether it had to be overruled.

@@ -147,8 +147,8 @@ impl<L: LightField> Solution<L> {
     }
 
     /// What the extension makes of all light that arrived at a leaf, as [`reflected`](Self::reflected) keeps it of those whose light
-    /// links asked for: found anew by each call. What differs by less than `negligible` (W/(m² sr)) makes no difference; the rest
-    /// may have this relative `error`.
+    /// links asked for: found anew by each call. What differs by less than `negligible` (W/(m² sr), ≥ 0) makes no difference; the rest
+    /// may have this relative `error` (0…1).
     #[must_use]
     pub fn reflect(&self, leaf: NodeId, negligible: f32, error: f32) -> L::Exitant {
         let irradiance = self.exitant.irradiance[leaf.index()];

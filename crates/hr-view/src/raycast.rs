@@ -88,7 +88,7 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     glowing: Vec<u32>,
     /// By node, which emitters light it; found out of leaves where it is asked for.
     lights: Vec<OnceLock<Box<Lights>>>,
-    /// With distributions no lobe is followed.
+    /// Where lobes are followed: not with distributions, and not where nothing is glossy.
     ends: Option<Ends<B>>,
     even: AtomicU64,
     smooth: AtomicU64,
@@ -193,7 +193,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             tracer,
             glowing,
             lights,
-            ends: (mode != Mode::Distributions).then(|| Ends::new(solution)),
+            ends: (mode != Mode::Distributions && solution.elements.nodes[0].active).then(|| Ends::new(solution)),
             even: AtomicU64::new(0),
             smooth: AtomicU64::new(0),
             half_shadows: AtomicU64::new(0),

@@ -27,16 +27,10 @@ pub(super) struct Ends<B: Basis> {
 impl<B: Basis> Ends<B> {
     /// Of all leaves of a solution.
     pub(super) fn new(solution: &Solution<GlossyField<B>>) -> Self {
-        let (mut light, mut area) = (0.0, 0.0);
-        for leaf in solution.elements.patch_leaves() {
-            let part = f64::from(solution.elements.nodes[leaf as usize].area);
-            light += part * f64::from(solution.exitant.irradiance[leaf as usize].max_element());
-            area += part;
-        }
-        let mean = if area > 0.0 { (light / area) as f32 } else { 0.0 };
         Self {
             leaves: std::iter::repeat_with(OnceLock::new).take(solution.elements.nodes.len()).collect(),
-            negligible: NEGLIGIBLE * FRAC_1_PI * mean,
+            // The root's irradiance is the mean of all.
+            negligible: NEGLIGIBLE * FRAC_1_PI * solution.exitant.irradiance[0].max_element(),
             asked: AtomicU64::new(0),
             found: AtomicU64::new(0),
         }
