@@ -574,6 +574,7 @@ mod beam;
 mod eight;
 mod keep;
 mod occluders;
+mod pieces;
 mod shaft;
 #[cfg(test)]
 mod tests;

@@ -4,15 +4,13 @@
 //!
 //! From all points of a patch the same few polygons may be in the way, which a [shaft](super::shaft) finds once. No ray is shot.
 
+use super::pieces::{Corners, Pieces, Sides};
 use super::shaft::{End, Proof, Shaft};
 use super::{NO_BLOCKER, Visibility};
 use crate::form_factor::{IN_PLANE, Part, in_front, lambert, outline};
 use crate::geometry::Domain;
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
-use smallvec::{SmallVec, smallvec};
-
-/// What is no further from a plane than this share of its distance lies in it: pieces so thin would add nothing but work.
-const THIN: f64 = 1e-7;
+use smallvec::SmallVec;
 
 /// One side of a part of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,9 +33,6 @@ pub struct Occluders {
     /// The plane of each: unit normal, and distance from the zero point.
     planes: Vec<Vec4>,
 }
-
-/// A convex polygon whose corners are relative to the point that sees it.
-type Piece = SmallVec<[DVec3; 6]>;
 
 impl Visibility {
     /// What may hide parts of a polygon that sends light from the points of a patch that it shines at. `None` where the sender or
@@ -73,7 +68,7 @@ impl Visibility {
         occluders.push(&outline);
         for surface in hiding {
             let polygon = self.geometries()[surface as usize].polygon()?;
-            let polygon: Piece = polygon.iter().map(|corner| corner.as_dvec3()).collect();
+            let polygon: Corners = polygon.iter().map(|corner| corner.as_dvec3()).collect();
             // What is behind the sender hides nothing of it.
             let before = in_front(&polygon, outline[0], normal);
             if before.len() >= 3 {
@@ -126,37 +121,46 @@ impl Occluders {
         if self.planes.is_empty() || height(0) <= IN_PLANE {
             return 0.0;
         }
-        let mut sender = self.polygon(0, x);
+        let mut sender = Corners::new();
+        self.seen_from(x, 0, &mut sender);
         if n != normal {
             sender = in_front(&sender, DVec3::ZERO, normal.as_dvec3()).into_iter().collect();
         }
-        let mut pieces: SmallVec<[Piece; 8]> = smallvec![sender.clone()];
+        let view = Sides::new(&sender, false);
+        let (mut pieces, mut left) = (&mut Pieces::default(), &mut Pieces::default());
+        pieces.push(&sender);
+        let (mut polygon, mut sides) = (Corners::new(), Sides::default());
         for occluder in 1..self.planes.len() {
             let height = height(occluder);
             if height.abs() <= IN_PLANE {
                 // Seen edge-on.
                 continue;
             }
-            let sides = Sides::new(&self.polygon(occluder, x), height < 0.0);
-            if sides.are_clear_of(&sender) {
+            self.seen_from(x, occluder, &mut polygon);
+            // What is beside all of the sender leaves its pieces whole, too.
+            if view.are_clear_of(&polygon) || !sides.meet(&polygon, height < 0.0, &sender) {
                 continue;
             }
-            for at in (0..pieces.len()).rev() {
-                if !sides.are_clear_of(&pieces[at]) {
-                    let piece = pieces.swap_remove(at);
-                    sides.cut(piece, &mut pieces);
+            left.clear();
+            for piece in pieces.iter() {
+                if sides.are_clear_of(piece) {
+                    left.push(piece);
+                } else {
+                    sides.cut(piece, left);
                 }
             }
+            std::mem::swap(&mut pieces, &mut left);
         }
         let n = n.as_dvec3();
-        pieces.into_iter().map(|piece| lambert(n, piece.into_iter())).sum::<f64>().min(1.0) as f32
+        pieces.iter().map(|piece| lambert(n, piece.iter().copied())).sum::<f64>().min(1.0) as f32
     }
 
-    /// A polygon as it is seen from a point.
-    fn polygon(&self, at: usize, x: Vec3) -> Piece {
+    /// A polygon as it is seen from a point, in the place of another one.
+    fn seen_from(&self, x: Vec3, at: usize, polygon: &mut Corners) {
         let start = at.checked_sub(1).map_or(0, |before| self.ends[before]);
         let corners = &self.corners[start as usize..self.ends[at] as usize];
-        corners.iter().map(|corner| corner.as_dvec3() - x.as_dvec3()).collect()
+        polygon.clear();
+        polygon.extend(corners.iter().map(|corner| corner.as_dvec3() - x.as_dvec3()));
     }
 }
 
@@ -164,81 +168,6 @@ impl Occluders {
 fn normal(polygon: &[DVec3]) -> DVec3 {
     let fan = polygon.windows(2).skip(1).map(|pair| (pair[0] - polygon[0]).cross(pair[1] - polygon[0]));
     fan.sum::<DVec3>().normalize_or_zero()
-}
-
-/// Planes through the zero point and the edges of a convex polygon, with their squared lengths: what it hides is on the inner side of
-/// all.
-struct Sides(SmallVec<[(DVec3, f64); 6]>);
-
-/// Where a corner is.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum At {
-    Inside,
-    Between,
-    Outside,
-}
-
-impl Sides {
-    /// Of a polygon whose normal points to the zero point, or away from it.
-    fn new(polygon: &[DVec3], away: bool) -> Self {
-        let sign = if away { 1.0 } else { -1.0 };
-        let edge = |i: usize| {
-            let side = polygon[i].cross(polygon[(i + 1) % polygon.len()]) * sign;
-            (side, side.length_squared())
-        };
-        Self((0..polygon.len()).map(edge).filter(|(_, square)| *square > 0.0).collect())
-    }
-
-    /// Whether a convex polygon is beyond one of them.
-    fn are_clear_of(&self, polygon: &[DVec3]) -> bool {
-        self.0.iter().any(|side| polygon.iter().all(|corner| at(side, *corner) != At::Inside))
-    }
-
-    /// Adds what of a convex polygon is beyond any of them.
-    fn cut(&self, mut piece: Piece, outside: &mut SmallVec<[Piece; 8]>) {
-        for side in &self.0 {
-            let (outer, inner) = parted(&piece, side);
-            if outer.len() >= 3 {
-                outside.push(outer);
-            }
-            piece = inner;
-        }
-    }
-}
-
-fn at((side, square): &(DVec3, f64), corner: DVec3) -> At {
-    let height = side.dot(corner);
-    if height * height <= THIN * THIN * square * corner.length_squared() {
-        At::Between
-    } else if height > 0.0 {
-        At::Inside
-    } else {
-        At::Outside
-    }
-}
-
-/// What of a convex polygon is on the outer and on the inner side of a plane through the zero point.
-fn parted(piece: &[DVec3], side: &(DVec3, f64)) -> (Piece, Piece) {
-    let places: SmallVec<[At; 8]> = piece.iter().map(|corner| at(side, *corner)).collect();
-    let (mut outer, mut inner) = (Piece::new(), Piece::new());
-    for (i, &to) in piece.iter().enumerate() {
-        let before = (i + piece.len() - 1) % piece.len();
-        if matches!((places[before], places[i]), (At::Inside, At::Outside) | (At::Outside, At::Inside)) {
-            let from = piece[before];
-            let (low, high) = (side.0.dot(from), side.0.dot(to));
-            let crossing = from + (to - from) * (low / (low - high));
-            outer.push(crossing);
-            inner.push(crossing);
-        }
-        if places[i] != At::Inside {
-            outer.push(to);
-        }
-        if places[i] != At::Outside {
-            inner.push(to);
-        }
-    }
-    let filled = |piece: Piece, place: At| if places.contains(&place) { piece } else { Piece::new() };
-    (filled(outer, At::Outside), filled(inner, At::Inside))
 }
 
 #[cfg(test)]
