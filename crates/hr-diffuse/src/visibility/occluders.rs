@@ -127,8 +127,7 @@ impl Occluders {
             sender = in_front(&sender, DVec3::ZERO, normal.as_dvec3()).into_iter().collect();
         }
         let view = Sides::new(&sender, false);
-        let (mut pieces, mut left) = (&mut Pieces::default(), &mut Pieces::default());
-        pieces.push(&sender);
+        let mut pieces = Pieces::of(&sender);
         let (mut polygon, mut sides) = (Corners::new(), Sides::default());
         for occluder in 1..self.planes.len() {
             let height = height(occluder);
@@ -138,18 +137,9 @@ impl Occluders {
             }
             self.seen_from(x, occluder, &mut polygon);
             // What is beside all of the sender leaves its pieces whole, too.
-            if view.are_clear_of(&polygon) || !sides.meet(&polygon, height < 0.0, &sender) {
-                continue;
+            if !view.are_clear_of(&polygon) && sides.meet(&polygon, height < 0.0, &sender) {
+                pieces.cut(&sides);
             }
-            left.clear();
-            for piece in pieces.iter() {
-                if sides.are_clear_of(piece) {
-                    left.push(piece);
-                } else {
-                    sides.cut(piece, left);
-                }
-            }
-            std::mem::swap(&mut pieces, &mut left);
         }
         let n = n.as_dvec3();
         pieces.iter().map(|piece| lambert(n, piece.iter().copied())).sum::<f64>().min(1.0) as f32
@@ -160,7 +150,7 @@ impl Occluders {
         let start = at.checked_sub(1).map_or(0, |before| self.ends[before]);
         let corners = &self.corners[start as usize..self.ends[at] as usize];
         polygon.clear();
-        polygon.extend(corners.iter().map(|corner| corner.as_dvec3() - x.as_dvec3()));
+        corners.iter().for_each(|corner| polygon.push(corner.as_dvec3() - x.as_dvec3()));
     }
 }
 

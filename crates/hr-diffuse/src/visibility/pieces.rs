@@ -1,6 +1,6 @@
 //! Pieces of a convex polygon that others leave of it, as a point sees them: corners are relative to that point, and planes go through it.
 //!
-//! This is where the light of outlined emitters takes its time, so what is cut goes to and fro between buffers that stay in place.
+//! This is where the light of outlined emitters takes its time, so nothing is moved or allocated that need not be.
 
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -14,34 +14,90 @@ pub(super) type Corners = SmallVec<[DVec3; 8]>;
 /// Convex polygons.
 #[derive(Default)]
 pub(super) struct Pieces {
-    corners: SmallVec<[DVec3; 32]>,
-    /// Where each of them ends there.
-    ends: SmallVec<[u32; 8]>,
+    /// Corners of all, and of those that have been cut: to leave those there takes less than to move what follows.
+    corners: SmallVec<[DVec3; 64]>,
+    /// Where each of them starts and ends there.
+    ranges: SmallVec<[[u32; 2]; 16]>,
 }
 
 impl Pieces {
+    pub(super) fn of(polygon: &[DVec3]) -> Self {
+        let mut pieces = Self::default();
+        pieces.push(polygon);
+        pieces
+    }
+
     pub(super) fn iter(&self) -> impl Iterator<Item = &[DVec3]> {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(start, &end)| &self.corners[start as usize..end as usize])
+        self.ranges.iter().map(|&[start, end]| &self.corners[start as usize..end as usize])
     }
 
-    pub(super) fn clear(&mut self) {
-        self.corners.clear();
-        self.ends.clear();
+    /// Takes away what of each is on the inner side of all of some sides.
+    pub(super) fn cut(&mut self, sides: &Sides) {
+        for at in (0..self.ranges.len()).rev() {
+            let [start, end] = self.ranges[at];
+            let piece = &self.corners[start as usize..end as usize];
+            if !sides.are_clear_of(piece) {
+                let piece = Corners::from_slice(piece);
+                self.ranges.swap_remove(at);
+                self.push_outside(piece, sides);
+            }
+        }
     }
 
-    pub(super) fn push(&mut self, piece: &[DVec3]) {
+    /// Adds what of a convex polygon is beyond any of some sides.
+    fn push_outside(&mut self, mut piece: Corners, sides: &Sides) {
+        let (mut piece, mut inner) = (&mut piece, &mut Corners::new());
+        let mut places: SmallVec<[At; 8]> = SmallVec::new();
+        for side in &sides.0 {
+            places.clear();
+            piece.iter().for_each(|corner| places.push(at(side, *corner)));
+            if !places.contains(&At::Inside) {
+                if places.contains(&At::Outside) {
+                    self.push(piece);
+                }
+                return;
+            }
+            if places.contains(&At::Outside) {
+                self.part(piece, &places, side.0, inner);
+                std::mem::swap(&mut piece, &mut inner);
+            }
+        }
+    }
+
+    /// Adds what of a convex polygon is on the outer side of a plane, and puts what is on the inner side in the place of another polygon.
+    fn part(&mut self, piece: &[DVec3], places: &[At], side: DVec3, inner: &mut Corners) {
+        let start = self.corners.len();
+        inner.clear();
+        let mut before = piece.len() - 1;
+        for (i, &to) in piece.iter().enumerate() {
+            if matches!((places[before], places[i]), (At::Inside, At::Outside) | (At::Outside, At::Inside)) {
+                let from = piece[before];
+                let (low, high) = (side.dot(from), side.dot(to));
+                let crossing = from + (to - from) * (low / (low - high));
+                self.corners.push(crossing);
+                inner.push(crossing);
+            }
+            if places[i] != At::Inside {
+                self.corners.push(to);
+            }
+            if places[i] != At::Outside {
+                inner.push(to);
+            }
+            before = i;
+        }
+        self.close(start);
+    }
+
+    fn push(&mut self, piece: &[DVec3]) {
+        let start = self.corners.len();
         self.corners.extend_from_slice(piece);
-        self.close();
+        self.close(start);
     }
 
-    /// Makes a piece of the corners since the last one, if they are enough.
-    fn close(&mut self) {
-        let start = self.ends.last().map_or(0, |&end| end as usize);
-        if self.corners.len() < start + 3 {
-            self.corners.truncate(start);
-        } else {
-            self.ends.push(self.corners.len() as u32);
+    /// Makes a piece of the corners from this one on, if they are enough.
+    fn close(&mut self, start: usize) {
+        if self.corners.len() >= start + 3 {
+            self.ranges.push([start, self.corners.len()].map(|corner| corner as u32));
         }
     }
 }
@@ -83,24 +139,6 @@ impl Sides {
     pub(super) fn are_clear_of(&self, polygon: &[DVec3]) -> bool {
         self.0.iter().any(|side| is_beyond(side, polygon))
     }
-
-    /// Adds what of a convex polygon is beyond any of them.
-    pub(super) fn cut(&self, piece: &[DVec3], outside: &mut Pieces) {
-        let (mut piece, mut inner) = (&mut Corners::from_slice(piece), &mut Corners::new());
-        for side in &self.0 {
-            let places: SmallVec<[At; 8]> = piece.iter().map(|corner| at(side, *corner)).collect();
-            if !places.contains(&At::Inside) {
-                if places.contains(&At::Outside) {
-                    outside.push(piece);
-                }
-                return;
-            }
-            if places.contains(&At::Outside) {
-                part(piece, &places, side.0, (outside, inner));
-                std::mem::swap(&mut piece, &mut inner);
-            }
-        }
-    }
 }
 
 /// The sides of a polygon that has any.
@@ -127,27 +165,4 @@ fn at((side, square): &Plane, corner: DVec3) -> At {
 /// Whether nothing of a polygon is on the inner side.
 fn is_beyond(side: &Plane, polygon: &[DVec3]) -> bool {
     polygon.iter().all(|&corner| side.0.dot(corner) <= 0.0 || at(side, corner) != At::Inside)
-}
-
-/// Adds what of a convex polygon is on the outer side of a plane, and puts what is on the inner side in the place of another polygon.
-fn part(piece: &[DVec3], places: &[At], side: DVec3, (outside, inner): (&mut Pieces, &mut Corners)) {
-    inner.clear();
-    let mut before = piece.len() - 1;
-    for (i, &to) in piece.iter().enumerate() {
-        if matches!((places[before], places[i]), (At::Inside, At::Outside) | (At::Outside, At::Inside)) {
-            let from = piece[before];
-            let (low, high) = (side.dot(from), side.dot(to));
-            let crossing = from + (to - from) * (low / (low - high));
-            outside.corners.push(crossing);
-            inner.push(crossing);
-        }
-        if places[i] != At::Inside {
-            outside.corners.push(to);
-        }
-        if places[i] != At::Outside {
-            inner.push(to);
-        }
-        before = i;
-    }
-    outside.close();
 }
