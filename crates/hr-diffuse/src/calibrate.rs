@@ -34,9 +34,9 @@ const OF_LINKS: Doubt = Doubt { whole: 0.1, part: 0.03, noise: 0.05 };
 
 /// Light is changed by no more than this factor, …
 const MOST: f64 = 1.8;
-/// … and by less where much of it is reflected: of what is absorbed at least this share still is. So rows of form factors times
-/// reflectance stay below 1 if they were before. Within that what was found counts there as anywhere: what is wrong is repeated many
-/// times, and that the rows' sums are right does not tell which of what is seen is bright.
+/// … and made brighter by less where what is seen reflects much: of what that absorbs at least this share still is, so that light dies out
+/// as it did. Within that what was found counts there as anywhere: what is wrong is repeated many times, and that the rows' sums are right
+/// does not tell which of what is seen is bright.
 const ABSORBED: f64 = 0.2;
 /// That parts differ by as much as is believed counts as so many of them that are known for certain.
 const BELIEVED_PARTS: f64 = 10.0;
@@ -95,10 +95,11 @@ impl Sums {
     }
 }
 
-/// Factors for reflected light, in the order of the places in `expected`; from so many rays, and how many were shot. `None` where `watch` breaks.
+/// Factors for reflected light, in the order of the places in `expected`, which come with what share of the light there what is seen
+/// reflects; from so many rays, and how many were shot. `None` where `watch` breaks.
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
-    expected: &[Expected],
+    (expected, reflectances): (&[Expected], &[f32]),
     rays: usize,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<(Vec<f32>, u64)> {
@@ -154,12 +155,13 @@ pub(crate) fn calibrate<L: LightField>(
         found.extend(threads::map_range(part, 8, look));
     }
     let factors = factors(light.elements, expected.iter().map(|of| of.place).zip(found), OF_LINKS);
-    let factor = |&Expected { place, .. }: &Expected| {
-        let reflected = f64::from(light.element(place).importance);
-        let most = ((1.0 - ABSORBED * (1.0 - reflected)) / reflected).clamp(1.0, MOST);
-        factors[place as usize].clamp(most.recip(), most) as f32
+    let factor = |(of, &reflectance): (&Expected, &f32)| {
+        let reflectance = f64::from(reflectance);
+        let most = ((1.0 - ABSORBED * (1.0 - reflectance)) / reflectance).clamp(1.0, MOST);
+        factors[of.place as usize].clamp(MOST.recip(), most) as f32
     };
-    Some((expected.iter().map(factor).collect(), counts.iter().map(|(count, _)| u64::from(*count)).sum()))
+    let factors = expected.iter().zip(reflectances).map(factor).collect();
+    Some((factors, counts.iter().map(|(count, _)| u64::from(*count)).sum()))
 }
 
 /// By node, what is found over what it is compared with, by the observations at leaves or places: of each part as of its whole, as far as
@@ -246,28 +248,29 @@ mod tests {
     use crate::{DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solver, Surface};
     use glam::DVec3;
 
-    /// A cube whose ceiling shines, with walls of which so much is reflected, solved.
+    /// A cube whose ceiling shines, of which so much is reflected, solved.
     fn room(reflectance: f32) -> Solver {
-        room_with(reflectance, ())
+        room_of([reflectance; 2], ())
     }
 
-    /// The same with an extension.
-    fn room_with<L: LightField>(reflectance: f32, field: L) -> Solver<L> {
+    /// The same with an extension; walls and what is above and below reflect as much.
+    fn room_of<L: LightField>([walls, rest]: [f32; 2], field: L) -> Solver<L> {
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
         let quad =
             |o: DVec3, a: DVec3, b: DVec3, material| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), material);
-        let wall = DiffuseMaterial { reflectance: Rgb::splat(reflectance), exitance: Rgb::ZERO, two_sided: false };
-        let lamp = DiffuseMaterial { exitance: Rgb::ONE, ..wall };
+        let wall = DiffuseMaterial { reflectance: Rgb::splat(walls), exitance: Rgb::ZERO, two_sided: false };
+        let floor = DiffuseMaterial { reflectance: Rgb::splat(rest), ..wall };
+        let lamp = DiffuseMaterial { exitance: Rgb::ONE, ..floor };
         let o = DVec3::ZERO;
         let surfaces = vec![
-            quad(o, x, y, 0),
+            quad(o, x, y, 2),
             quad(z, y, x, 1),
             quad(o, y, z, 0),
             quad(x, z, y, 0),
             quad(o, z, x, 0),
             quad(y, x, z, 0),
         ];
-        let input = SceneInput { surfaces, materials: vec![wall, lamp], ..SceneInput::default() };
+        let input = SceneInput { surfaces, materials: vec![wall, lamp, floor], ..SceneInput::default() };
         let mut solver = Solver::new(&input, Settings::with_error(0.05), field).expect("the room is sound");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         solver
@@ -282,7 +285,8 @@ mod tests {
             *square *= share(*place) * share(*place);
         }
         let watch = &mut || ControlFlow::Continue(());
-        let (factors, shot) = calibrate(light, &expected, rays, watch).expect("nobody breaks");
+        let seen = solver.gather.reflectances(light, &solver.links);
+        let (factors, shot) = calibrate(light, (&expected, &seen), rays, watch).expect("nobody breaks");
         assert!(shot.abs_diff(rays as u64) < 2, "{shot} rays of {rays}");
         (expected.into_iter().map(|of| of.place).collect(), factors)
     }
@@ -370,10 +374,11 @@ mod tests {
     /// An extension's light is compared, too.
     #[test]
     fn nothing_changes_where_nothing_is_missing() {
-        let solver = room_with(0.5, Echo { material: 0, albedo: 0.05, errs: false });
+        let solver = room_of([0.5; 2], Echo { material: 0, albedo: 0.05, errs: false });
         let (light, expected) = (solver.light(), solver.gather.expected(solver.light(), &solver.links));
         let (factors, _) =
-            calibrate(light, &expected, 200_000, &mut || ControlFlow::Continue(())).expect("nobody breaks");
+            calibrate(light, (&expected, &vec![0.5; expected.len()]), 200_000, &mut || ControlFlow::Continue(()))
+                .expect("nobody breaks");
         let sum = |of: &dyn Fn(usize) -> f32| {
             let weight = |(i, expected): (usize, &Expected)| light.element(expected.place).area * of(i);
             expected.iter().enumerate().map(weight).sum::<f32>()
@@ -387,6 +392,21 @@ mod tests {
         let solver = room(0.5);
         let (_, factors) = factors(&solver, |_| 1.0, 50);
         assert!(factors.iter().all(|factor| (factor - 1.0).abs() < 0.1), "{factors:?}");
+    }
+
+    /// What a wall reflects all of is seen with what absorbs some: light dies out, however much of what is missing comes back.
+    #[test]
+    fn what_reflects_all_may_be_brought_more() {
+        let solver = room_of([1.0, 0.5], ());
+        let (leaves, factors) = factors(&solver, |_| 0.9, 200_000);
+        let walls =
+            || leaves.iter().zip(&factors).filter(|(leaf, _)| solver.elements.nodes[**leaf as usize].importance == 1.0);
+        let mean = walls().map(|(_, factor)| factor).sum::<f32>() / walls().count() as f32;
+        assert!((mean - 1.0 / 0.9).abs() < 0.03, "{mean}");
+        let seen = solver.gather.reflectances(solver.light(), &solver.links);
+        for ((leaf, factor), seen) in leaves.iter().zip(&factors).zip(seen) {
+            assert!(seen > 0.5 && factor * seen < 1.0, "{leaf}: {factor} of {seen}");
+        }
     }
 
     /// Where nearly all is reflected light must go on dying out.
@@ -403,7 +423,7 @@ mod tests {
         let light = solver.light();
         let nothing = |place| Expected { place, mean: 0.0, square: 0.0 };
         let nothing: Vec<Expected> = light.elements.patch_leaves().map(nothing).collect();
-        let answer = calibrate(light, &nothing, 100, &mut || ControlFlow::Continue(()));
+        let answer = calibrate(light, (&nothing, &vec![0.0; nothing.len()]), 100, &mut || ControlFlow::Continue(()));
         assert_eq!(answer, Some((vec![1.0; nothing.len()], 0)));
     }
 }

@@ -169,7 +169,10 @@ impl Gather {
             }
         }
         let places = self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count();
-        let Some((factors, rays)) = calibrate(light, &expected, rays_each * places, watch) else { return 0 };
+        let reflectances = self.reflectances(light, links);
+        let Some((factors, rays)) = calibrate(light, (&expected, &reflectances), rays_each * places, watch) else {
+            return 0;
+        };
         for ((row, factor), expected) in self.rows.iter_mut().zip(factors).zip(expected) {
             if expected.mean > 0.0 {
                 row[Group::Rest as usize] *= factor;
@@ -205,6 +208,26 @@ impl Gather {
         let [means, squares] = [reflected, squares].map(|carried| self.on_places(light, links, &carried));
         let expected = |(&place, (mean, square))| Expected { place, mean, square };
         self.push.places.nodes.iter().zip(means.into_iter().zip(squares)).map(expected).collect()
+    }
+
+    /// By place, what share of the light there what is seen reflects, nodes by their largest channels.
+    pub(crate) fn reflectances<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<f32> {
+        let nodes = &light.elements.nodes;
+        let mut means = vec![0.0_f32; nodes.len()];
+        for (node, element) in nodes.iter().enumerate().rev() {
+            let is_leaf = element.child_count == 0;
+            let power = if is_leaf { element.importance * element.area } else { means[node] };
+            means[node] = if element.area > 0.0 { power / element.area } else { 0.0 };
+            if node > 0 {
+                means[element.parent as usize] += power;
+            }
+        }
+        let mut seen = self.weigh(light, links, |sender| means[sender as usize]);
+        for (seen, all) in seen.iter_mut().zip(self.weigh(light, links, |_| 1.0)) {
+            // Links to clusters may together be more than all there is to see.
+            *seen /= all.max(1.0);
+        }
+        seen
     }
 
     /// By place, what arrives there of light that has been reflected diffusely (sum of channels).
