@@ -6,6 +6,10 @@
 //! light gets wrong (D. Lischinski, B. Smits, D. Greenberg, "Bounds and error estimates for radiosity", SIGGRAPH 1994,
 //! section 3). Each leaf is looked at twice: the two estimates' difference tells how much of it is the rays' own noise.
 
+mod linked;
+
+pub(crate) use linked::Brought;
+
 use crate::Rgb;
 use crate::hierarchy::Kind;
 use crate::hooks::LightField;
@@ -14,8 +18,9 @@ use crate::sampling::{cosine_direction, hash, point4, unit};
 use crate::segments::{light_segment, pick};
 use crate::threads;
 use crate::transport::Light;
-use crate::visibility::NO_BLOCKER;
+use crate::visibility::{Hit, NO_BLOCKER};
 use glam::{Vec2, Vec3};
+use linked::{Senders, Toward};
 use smallvec::SmallVec;
 use std::f32::consts::PI;
 use std::ops::{ControlFlow, Range};
@@ -25,6 +30,10 @@ const GRID: u32 = 8;
 /// Rays of one estimate toward emitters; leaves that are brighter than others get up to `MOST_BRIGHT` times as many.
 const TOWARD_EMITTERS: u32 = 32;
 const MOST_BRIGHT: f32 = 16.0;
+
+/// Rays of one estimate toward what links say that reflected light comes from, where an extension takes part: lobes that are narrow, or far
+/// away, are met by few rays of the grid.
+const TOWARD_SENDERS: u32 = 32;
 
 /// Leaves that a thread looks from between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 32;
@@ -77,9 +86,10 @@ struct Found {
     rays: u32,
 }
 
-/// Looks at a solution from so many random leaves; `None` where `watch` breaks.
+/// Looks at a solution from so many random leaves, if known with what its links bring; `None` where `watch` breaks.
 pub(crate) fn residual<L: LightField>(
     light: Light<'_, L>,
+    brought: Option<Brought<'_>>,
     count: usize,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Residual> {
@@ -113,7 +123,8 @@ pub(crate) fn residual<L: LightField>(
     let look = |i: usize| {
         let at = (i as f64 + f64::from(unit(hash(i as u32, 0x51de)))) / count as f64 * sum;
         let leaf = ends[ends.partition_point(|&(_, end)| end <= at).min(ends.len() - 1)].0;
-        look(light, &emitters, mean as f32, leaf, i as u32)
+        let senders = brought.map(|brought| Senders::of(light, leaf, brought));
+        look(light, (&emitters, senders.as_ref()), mean as f32, leaf, i as u32)
     };
     let mut found: Vec<Found> = Vec::with_capacity(count);
     while found.len() < count {
@@ -229,15 +240,21 @@ fn children<L: LightField>(light: Light<'_, L>, node: u32) -> Range<u32> {
     element.first_child..element.first_child + element.child_count
 }
 
-/// A random point of a leaf, with its normal.
-fn point<L: LightField>(light: Light<'_, L>, leaf: u32, u: Vec2) -> (Vec3, Vec3) {
+/// A random point of a leaf, with its normal and the [area that it stands for](crate::Shape::sample_area).
+fn point<L: LightField>(light: Light<'_, L>, leaf: u32, u: Vec2) -> (Vec3, Vec3, f32) {
     let element = light.element(leaf);
-    let (x, normal, _) = light.scene.surfaces()[element.source as usize].sample_area(element.domain, u.x, u.y);
-    (x, if element.kind == Kind::Back { -normal } else { normal })
+    let (x, normal, area) = light.scene.surfaces()[element.source as usize].sample_area(element.domain, u.x, u.y);
+    (x, if element.kind == Kind::Back { -normal } else { normal }, area)
 }
 
 /// Looks around from all over a leaf.
-fn look<L: LightField>(light: Light<'_, L>, emitters: &Emitters, mean: f32, leaf: u32, seed: u32) -> Found {
+fn look<L: LightField>(
+    light: Light<'_, L>,
+    (emitters, senders): (&Emitters, Option<&Senders>),
+    mean: f32,
+    leaf: u32,
+    seed: u32,
+) -> Found {
     let solution = light.exitant.irradiance[leaf as usize].element_sum();
     let count = (TOWARD_EMITTERS as f32 * (solution / mean).clamp(1.0, MOST_BRIGHT)) as u32;
     let mut found = Found { estimates: [0.0; 2], direct: 0.0, solution, rays: 0 };
@@ -246,8 +263,12 @@ fn look<L: LightField>(light: Light<'_, L>, emitters: &Emitters, mean: f32, leaf
         let (lights, shot) = from_lights(light, emitters, leaf, seed);
         let (surfaces, also) = from_emitters(light, emitters, leaf, (seed, count));
         found.direct += 0.5 * (lights + surfaces);
-        found.estimates[half as usize] = lights + surfaces + reflected(light, leaf, seed);
-        found.rays += shot + also + GRID * GRID;
+        let (reflected, looked) = match senders {
+            Some(senders) => reflected_by(light, senders, leaf, seed),
+            None => (reflected(light, leaf, seed), GRID * GRID),
+        };
+        found.estimates[half as usize] = lights + surfaces + reflected;
+        found.rays += shot + also + looked;
     }
     found
 }
@@ -258,7 +279,7 @@ fn from_lights<L: LightField>(light: Light<'_, L>, emitters: &Emitters, leaf: u3
     let (mut sum, mut rays) = (0.0, 0);
     for &node in &emitters.lights {
         let u = point4(hash(seed, node), 0);
-        let (x, n) = point(light, leaf, Vec2::new(u.x, u.y));
+        let (x, n, _) = point(light, leaf, Vec2::new(u.x, u.y));
         let index = light.element(node).source as usize;
         let (to, cosine) = light_segment(light.scene, index, x, n);
         let irradiance = light.scene.lights[index].intensity.element_sum() * light.factor_at(x, n, node);
@@ -286,11 +307,11 @@ fn from_emitters<L: LightField>(
     let (mut sum, mut rays, mut blocker) = (0.0, 0, NO_BLOCKER);
     for ray in 0..count {
         let u = point4(seed, ray);
-        let (x, n) = point(light, leaf, Vec2::new(u.z, u.w));
+        let (x, n, _) = point(light, leaf, Vec2::new(u.z, u.w));
         let Some((emitter, probability)) = emitters.pick(light, seen.clone(), x, unit(hash(seed, ray))) else {
             continue;
         };
-        let (at, normal) = point(light, emitter, Vec2::new(u.x, u.y));
+        let (at, normal, _) = point(light, emitter, Vec2::new(u.x, u.y));
         let to = at - x;
         let d2 = to.length_squared();
         let cosines = to.dot(n).max(0.0) * (-to.dot(normal)).max(0.0);
@@ -305,24 +326,63 @@ fn from_emitters<L: LightField>(
     (sum / count as f32, rays)
 }
 
+/// Points of a leaf, with normals, and stratified directions from there.
+fn around<L: LightField>(light: Light<'_, L>, leaf: u32, seed: u32) -> impl Iterator<Item = (Vec3, Vec3, Vec3)> {
+    (0..GRID * GRID).map(move |cell| {
+        let u = point4(seed ^ 0x3c3c, cell);
+        let (x, n, _) = point(light, leaf, Vec2::new(u.z, u.w));
+        let direction = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + Vec2::new(u.x, u.y)) / GRID as f32;
+        (x, n, cosine_direction(n, direction.x, direction.y))
+    })
+}
+
 /// Mean irradiance by light that has been reflected, over stratified directions.
 fn reflected<L: LightField>(light: Light<'_, L>, leaf: u32, seed: u32) -> f32 {
     let surface = light.element(leaf).source;
-    let mut sum = 0.0;
-    for cell in 0..GRID * GRID {
-        let u = point4(seed ^ 0x3c3c, cell);
-        let (x, n) = point(light, leaf, Vec2::new(u.z, u.w));
-        let direction = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + Vec2::new(u.x, u.y)) / GRID as f32;
-        let direction = cosine_direction(n, direction.x, direction.y);
-        sum += reflected_along(light, x, direction, surface);
-    }
-    sum / (GRID * GRID) as f32
+    let found = around(light, leaf, seed).map(|(x, _, direction)| reflected_along(light, x, direction, surface));
+    found.sum::<f32>() / (GRID * GRID) as f32
 }
 
-/// The leaf that a ray from a surface meets.
-fn seen_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> Option<u32> {
+/// The same by rays toward senders, too, and the number of rays.
+fn reflected_by<L: LightField>(light: Light<'_, L>, senders: &Senders, leaf: u32, seed: u32) -> (f32, u32) {
+    let surface = light.element(leaf).source;
+    // What counts a point that is seen in a direction: both ways to come by it, per projected solid angle over π.
+    let counts = |sender: u32, to: Vec3, cosine: f32, cosine_there: f32| {
+        let solid_angle = cosine * cosine_there / (PI * to.length_squared());
+        (GRID * GRID) as f32 + TOWARD_SENDERS as f32 * senders.density(light, sender) / solid_angle
+    };
+    let (mut sum, mut rays) = (0.0, GRID * GRID);
+    for (x, n, direction) in around(light, leaf, seed) {
+        let Some((hit, sender)) = seen_along(light, x, direction, surface) else { continue };
+        let counts = counts(sender, hit.point - x, n.dot(direction), hit.normal.dot(direction).abs());
+        sum += reflected_from(light, sender, direction) / counts;
+    }
+    let mut blocker = NO_BLOCKER;
+    for ray in 0..TOWARD_SENDERS {
+        let u = point4(seed ^ 0x5e4d, ray);
+        let (x, n, _) = point(light, leaf, Vec2::new(u.z, u.w));
+        let choice = (ray as f32 + unit(hash(hash(seed, 0x5e), ray))) / TOWARD_SENDERS as f32;
+        let Some(toward) = senders.pick(light, choice, Vec2::new(u.x, u.y)) else { continue };
+        let Toward { leaf: sender, at, normal, weight } = toward;
+        let to = at - x;
+        let direction = to.normalize_or_zero();
+        let (cosine, cosine_there) = (n.dot(direction), -normal.dot(direction));
+        if cosine > 0.0 && cosine_there > 0.0 {
+            rays += 1;
+            if !light.scene.visibility.occluded(x, at, [surface, light.element(sender).source], &mut blocker) {
+                let counts = counts(sender, to, cosine, cosine_there);
+                sum += weight * reflected_from(light, sender, direction) / counts;
+            }
+        }
+    }
+    (sum, rays)
+}
+
+/// What a ray from a surface meets, and the leaf there.
+fn seen_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> Option<(Hit, u32)> {
     let hit = light.scene.visibility.closest_except(x, direction, 0.0, f32::MAX, surface)?;
-    Some(light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv)?.0)
+    let leaf = light.elements.leaf_at(light.scene, hit.surface, !hit.front, hit.uv)?.0;
+    Some((hit, leaf))
 }
 
 /// What a leaf emits of its own.
@@ -334,16 +394,21 @@ fn own_light<L: LightField>(light: Light<'_, L>, leaf: u32) -> Rgb {
     }
 }
 
-/// Light that has been reflected toward a point of a surface (π times its radiance, sum of channels) by what a ray in a direction
-/// meets.
+/// Light that a leaf has reflected toward where a ray in some direction comes from (π times its radiance, sum of channels).
+fn reflected_from<L: LightField>(light: Light<'_, L>, sender: u32, direction: Vec3) -> f32 {
+    (light.emitted(sender, -direction) - own_light(light, sender)).max(Rgb::ZERO).element_sum()
+}
+
+/// The same by what a ray from a surface meets.
 pub(crate) fn reflected_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> f32 {
-    let reflected = |sender: u32| light.emitted(sender, -direction) - own_light(light, sender);
-    seen_along(light, x, direction, surface).map_or(0.0, |sender| reflected(sender).max(Rgb::ZERO).element_sum())
+    seen_along(light, x, direction, surface).map_or(0.0, |(_, sender)| reflected_from(light, sender, direction))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::DVec3;
 
     #[test]
     fn errors_are_unclear_within_two_standard_errors() {
@@ -352,5 +417,56 @@ mod tests {
         assert!(!found(0.05, 0.2).may_be(0.1), "it is fine for sure");
         assert!(!found(0.2, 0.2).may_be(0.1), "it is not for sure");
         assert!(!found(0.09, 0.01).may_be(0.1), "it is known well");
+    }
+
+    /// A dark room with a lamp for its ceiling and a small white plate off the floor, which reflects most of what walls get of
+    /// reflected light; solved.
+    fn dark_room() -> Solver {
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let quad =
+            |o: DVec3, a: DVec3, b: DVec3, material| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), material);
+        let dark = DiffuseMaterial { reflectance: Rgb::splat(0.02), exitance: Rgb::ZERO, two_sided: false };
+        let lamp = DiffuseMaterial { exitance: Rgb::ONE, ..dark };
+        let white = DiffuseMaterial { reflectance: Rgb::splat(0.9), ..dark };
+        let o = DVec3::ZERO;
+        let mut surfaces = vec![quad(o, x, y, 0), quad(z, y, x, 1), quad(o, y, z, 0), quad(x, z, y, 0)];
+        surfaces.extend([quad(o, z, x, 0), quad(y, x, z, 0)]);
+        surfaces.push(quad(DVec3::new(0.4, 0.5, 0.1), 0.1 * x, 0.1 * y, 2));
+        let input = SceneInput { surfaces, materials: vec![dark, lamp, white], ..SceneInput::default() };
+        let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        solver
+    }
+
+    /// Whatever links say, rays toward what they do find the same light as rays all over the hemisphere; where they are right, with less
+    /// noise.
+    #[test]
+    fn rays_toward_senders_find_the_same() {
+        let solver = dark_room();
+        let (light, arriving) = (solver.light(), solver.gather.arriving());
+        let wrong: Vec<Rgb> = arriving.iter().rev().copied().collect();
+        let shares = light.reflected_shares();
+        let mean_and_deviation = |values: &[f64]| {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt())
+        };
+        let walls = light.elements.patch_leaves().filter(|&leaf| light.element(leaf).source == 3).step_by(7);
+        let mut checked = 0;
+        for leaf in walls {
+            let all_over: Vec<f64> = (0..600).map(|seed| f64::from(reflected(light, leaf, seed))).collect();
+            let (mean, noise) = mean_and_deviation(&all_over);
+            for (arriving, is_right) in [(arriving, true), (wrong.as_slice(), false)] {
+                let brought = Brought { links: &solver.links, arriving, shares: &shares };
+                let senders = Senders::of(light, leaf, brought);
+                let toward: Vec<f64> =
+                    (0..600).map(|seed| f64::from(reflected_by(light, &senders, leaf, seed).0)).collect();
+                let (found, less) = mean_and_deviation(&toward);
+                let doubt = 4.0 * (noise * noise + less * less).sqrt() / 600.0_f64.sqrt();
+                assert!((found - mean).abs() < doubt, "{leaf}: {found}, not {mean} ± {doubt}");
+                assert!(!is_right || less < 0.5 * noise, "{leaf}: {less}, {noise}");
+                checked += 1;
+            }
+        }
+        assert!(checked >= 8, "{checked}");
     }
 }

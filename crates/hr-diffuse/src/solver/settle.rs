@@ -7,7 +7,7 @@ use crate::hooks::LightField;
 use crate::misjudged::Misjudged;
 use crate::reflect::Reflect;
 use crate::relight::ratio;
-use crate::residual::{RAYS_PER_LEAF, Residual, residual};
+use crate::residual::{Brought, RAYS_PER_LEAF, Residual, residual};
 use crate::sent::Sent;
 use crate::transport::Exitant;
 use std::ops::ControlFlow;
@@ -233,8 +233,13 @@ impl<L: LightField> Solver<L> {
         let count = (CHECK_SHARE * self.stats.rays as f32 / RAYS_PER_LEAF as f32) as u64;
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         let count = count.clamp(least, most) as usize;
+        let arriving = self.gather.arriving();
+        let shares = if self.elements.nodes[0].active { self.light().reflected_shares() } else { Vec::new() };
+        // What has been shot is not known by link.
+        let is_known = !shares.is_empty() && arriving.len() == self.links.all().len();
+        let brought = is_known.then_some(Brought { links: &self.links, arriving, shares: &shares });
         let mut look = |count| {
-            residual(self.light(), count, &mut || {
+            residual(self.light(), brought, count, &mut || {
                 *stopped = *stopped || watch(&progress).is_break();
                 if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
