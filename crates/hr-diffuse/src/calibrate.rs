@@ -3,12 +3,12 @@
 //! Rows of form factors (see [`leaf_rows`](crate::leaf_rows)) say how much is seen, not how bright it is: what is bright is
 //! seen by chance a little too much or too little, all over a region alike, and each bounce repeats it. Rays from all over a
 //! region know the mean, whatever the links. Few rays tell the mean of much, and little of a part; so each part is taken to be
-//! as the whole that it belongs to, as far as its own rays do not know better. Of narrow lobes few rays see the peaks: places that
-//! are lit by much directional light are left out.
+//! as the whole that it belongs to, as far as its own rays do not know better. Of narrow lobes few rays all over a hemisphere see the
+//! peaks: where an extension takes part half of them go where links say that light comes from.
 
 use crate::hierarchy::Elements;
 use crate::hooks::LightField;
-use crate::residual::reflected_along;
+use crate::residual::{Brought, Place, Rays, Senders, reflected_along};
 use crate::sampling::{cosine_direction, hash, point4, unit};
 use crate::segments::receiving_point;
 use crate::threads;
@@ -44,6 +44,8 @@ const BELIEVED_PARTS: f64 = 10.0;
 const MOST_APART: f64 = 0.1;
 /// Parts differ by no more than so many times (squared) what is believed.
 const MOST_SPREAD: f64 = 100.0;
+/// Rays that half go all over the hemisphere, half toward senders.
+const HALF_EACH: Rays = Rays { all_over: 0.5, toward: 0.5 };
 /// Places that a thread looks from between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 64;
 
@@ -96,10 +98,11 @@ impl Sums {
 }
 
 /// Factors for reflected light, in the order of the places in `expected`, which come with what share of the light there what is seen
-/// reflects; from so many rays, and how many were shot. `None` where `watch` breaks.
+/// reflects, if known with what links bring; from so many rays, and how many were shot. `None` where `watch` breaks.
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
     (expected, reflectances): (&[Expected], &[f32]),
+    brought: Option<Brought<'_>>,
     rays: usize,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<(Vec<f32>, u64)> {
@@ -134,6 +137,9 @@ pub(crate) fn calibrate<L: LightField>(
         .collect();
     let look = |index: usize| {
         let (Expected { place, mean, square }, (count, each)) = (expected[index], counts[index]);
+        let senders = brought.map(|brought| Senders::of(light, place, brought));
+        // Rays toward senders find what is small and bright by its power.
+        let square = if senders.is_some() { square.min(2.0 * mean * mean) } else { square };
         let variance = each * each * (f64::from(square) - f64::from(mean) * f64::from(mean)).max(0.0);
         let seed = hash(place, 0x1c0d);
         let mut sums = Sums::default();
@@ -141,7 +147,15 @@ pub(crate) fn calibrate<L: LightField>(
             let u = point4(seed, ray);
             let on = (unit(hash(hash(seed, 0x53), ray)), Vec2::new(u.z, u.w));
             let Some((x, n, surface)) = receiving_point(light, place, on) else { continue };
-            let found = reflected_along(light, x, cosine_direction(n, u.x, u.y), surface);
+            let (from, direction) = (Place { at: x, normal: n, surface }, cosine_direction(n, u.x, u.y));
+            let found = match &senders {
+                None => reflected_along(light, x, direction, surface),
+                Some(senders) if ray % 2 == seed % 2 => senders.all_over(light, from, direction, HALF_EACH),
+                Some(senders) => {
+                    let choice = unit(hash(hash(seed, 0x5e), ray));
+                    senders.toward(light, from, (choice, Vec2::new(u.x, u.y)), HALF_EACH).unwrap_or(0.0)
+                }
+            };
             sums.add(&Sums::of(each * f64::from(found), each * f64::from(mean), variance));
         }
         sums
@@ -286,7 +300,7 @@ mod tests {
         }
         let watch = &mut || ControlFlow::Continue(());
         let seen = solver.gather.reflectances(light, &solver.links);
-        let (factors, shot) = calibrate(light, (&expected, &seen), rays, watch).expect("nobody breaks");
+        let (factors, shot) = calibrate(light, (&expected, &seen), None, rays, watch).expect("nobody breaks");
         assert!(shot.abs_diff(rays as u64) < 2, "{shot} rays of {rays}");
         (expected.into_iter().map(|of| of.place).collect(), factors)
     }
@@ -371,20 +385,30 @@ mod tests {
         assert!(sure < 0.6 && unsure > 0.98, "{sure}, {unsure}");
     }
 
-    /// An extension's light is compared, too.
+    /// An extension's light is compared, too, by rays all over the hemisphere and by such as go where links say it comes from.
     #[test]
-    fn nothing_changes_where_nothing_is_missing() {
+    fn what_an_extension_reflects_is_known() {
         let solver = room_of([0.5; 2], Echo { material: 0, albedo: 0.05, errs: false });
         let (light, expected) = (solver.light(), solver.gather.expected(solver.light(), &solver.links));
-        let (factors, _) =
-            calibrate(light, (&expected, &vec![0.5; expected.len()]), 200_000, &mut || ControlFlow::Continue(()))
-                .expect("nobody breaks");
-        let sum = |of: &dyn Fn(usize) -> f32| {
-            let weight = |(i, expected): (usize, &Expected)| light.element(expected.place).area * of(i);
-            expected.iter().enumerate().map(weight).sum::<f32>()
-        };
-        let mean = sum(&|i| factors[i] * expected[i].mean) / sum(&|i| expected[i].mean);
-        assert!((mean - 1.0).abs() < 0.02, "{mean}");
+        let shares = light.reflected_shares();
+        let brought = Brought { links: &solver.links, arriving: solver.gather.arriving(), shares: &shares };
+        for (brought, missing) in [(None, 0.0), (Some(brought), 0.0), (Some(brought), 0.1)] {
+            let less = |of: &Expected| Expected {
+                mean: of.mean * (1.0 - missing),
+                square: of.square * (1.0 - missing).powi(2),
+                ..*of
+            };
+            let expected: Vec<Expected> = expected.iter().map(less).collect();
+            let watch = &mut || ControlFlow::Continue(());
+            let seen = vec![0.5; expected.len()];
+            let (factors, _) = calibrate(light, (&expected, &seen), brought, 200_000, watch).expect("nobody breaks");
+            let sum = |of: &dyn Fn(usize) -> f32| {
+                let weight = |(i, expected): (usize, &Expected)| light.element(expected.place).area * of(i);
+                expected.iter().enumerate().map(weight).sum::<f32>()
+            };
+            let mean = sum(&|i| factors[i] * expected[i].mean) / sum(&|i| expected[i].mean);
+            assert!((mean * (1.0 - missing) - 1.0).abs() < 0.02, "{mean} where {missing} is missing");
+        }
     }
 
     #[test]
@@ -423,7 +447,8 @@ mod tests {
         let light = solver.light();
         let nothing = |place| Expected { place, mean: 0.0, square: 0.0 };
         let nothing: Vec<Expected> = light.elements.patch_leaves().map(nothing).collect();
-        let answer = calibrate(light, (&nothing, &vec![0.0; nothing.len()]), 100, &mut || ControlFlow::Continue(()));
+        let answer =
+            calibrate(light, (&nothing, &vec![0.0; nothing.len()]), None, 100, &mut || ControlFlow::Continue(()));
         assert_eq!(answer, Some((vec![1.0; nothing.len()], 0)));
     }
 }

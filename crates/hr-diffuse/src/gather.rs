@@ -12,6 +12,7 @@ use crate::links::{Link, Links};
 use crate::places::Places;
 use crate::push::{self, Push, Spread, Weight, visible};
 use crate::reflect::Sends;
+use crate::residual::Brought;
 use crate::shooting::Shot;
 use crate::threads;
 use crate::transport::Light;
@@ -42,8 +43,6 @@ pub(crate) enum Group {
 /// How many there are.
 pub(crate) const GROUPS: usize = 4;
 
-/// What arrives at a leaf of reflected light is calibrated where at least this share of it is diffuse.
-const MOSTLY_DIFFUSE: f32 = 0.9;
 /// Where nothing but senders is seen form factors sum to 1; but for rounding.
 const CLOSED: f32 = 0.999;
 /// Clusters that emit more than this share of their power count as emitters.
@@ -161,16 +160,13 @@ impl Gather {
         rays_each: usize,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> u64 {
-        let mut expected = self.expected(light, links);
-        if light.element(0).active {
-            // Where lobes make much of what arrives few rays see their peaks.
-            for (expected, diffuse) in expected.iter_mut().zip(self.diffuse(light, links)) {
-                expected.mean = if diffuse >= MOSTLY_DIFFUSE * expected.mean { expected.mean } else { 0.0 };
-            }
-        }
+        let expected = self.expected(light, links);
+        let shares = light.reflected_shares();
+        let brought = light.element(0).active.then_some(Brought { links, arriving: &self.arriving, shares: &shares });
         let places = self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count();
         let reflectances = self.reflectances(light, links);
-        let Some((factors, rays)) = calibrate(light, (&expected, &reflectances), rays_each * places, watch) else {
+        let Some((factors, rays)) = calibrate(light, (&expected, &reflectances), brought, rays_each * places, watch)
+        else {
             return 0;
         };
         for ((row, factor), expected) in self.rows.iter_mut().zip(factors).zip(expected) {
@@ -228,16 +224,6 @@ impl Gather {
             *seen /= all.max(1.0);
         }
         seen
-    }
-
-    /// By place, what arrives there of light that has been reflected diffusely (sum of channels).
-    pub(crate) fn diffuse<L: LightField>(&self, light: Light<'_, L>, links: &Links) -> Vec<f32> {
-        let shares = light.reflected_shares();
-        self.by_place(light, links, |link, spread| {
-            let away = -light.direction_to(light.element(link.receiver).center, link.sender);
-            let factor = link.factor * visible(link, spread) * shares[link.sender as usize];
-            light.diffuse(link.sender, away).element_sum() * factor
-        })
     }
 
     /// By place, the sum of what `of` says of senders with extent, times form factors and visibility.

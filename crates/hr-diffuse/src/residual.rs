@@ -8,7 +8,7 @@
 
 mod linked;
 
-pub(crate) use linked::Brought;
+pub(crate) use linked::{Brought, Place, Rays, Senders};
 
 use crate::Rgb;
 use crate::hierarchy::Kind;
@@ -20,7 +20,6 @@ use crate::threads;
 use crate::transport::Light;
 use crate::visibility::{Hit, NO_BLOCKER};
 use glam::{Vec2, Vec3};
-use linked::{Senders, Toward};
 use smallvec::SmallVec;
 use std::f32::consts::PI;
 use std::ops::{ControlFlow, Range};
@@ -346,33 +345,16 @@ fn reflected<L: LightField>(light: Light<'_, L>, leaf: u32, seed: u32) -> f32 {
 /// The same by rays toward senders, too, and the number of rays.
 fn reflected_by<L: LightField>(light: Light<'_, L>, senders: &Senders, leaf: u32, seed: u32) -> (f32, u32) {
     let surface = light.element(leaf).source;
-    // What counts a point that is seen in a direction: both ways to come by it, per projected solid angle over π.
-    let counts = |sender: u32, to: Vec3, cosine: f32, cosine_there: f32| {
-        let solid_angle = cosine * cosine_there / (PI * to.length_squared());
-        (GRID * GRID) as f32 + TOWARD_SENDERS as f32 * senders.density(light, sender) / solid_angle
-    };
-    let (mut sum, mut rays) = (0.0, GRID * GRID);
-    for (x, n, direction) in around(light, leaf, seed) {
-        let Some((hit, sender)) = seen_along(light, x, direction, surface) else { continue };
-        let counts = counts(sender, hit.point - x, n.dot(direction), hit.normal.dot(direction).abs());
-        sum += reflected_from(light, sender, direction) / counts;
-    }
-    let mut blocker = NO_BLOCKER;
+    let each = Rays { all_over: (GRID * GRID) as f32, toward: TOWARD_SENDERS as f32 };
+    let from = |at, normal| Place { at, normal, surface };
+    let found = around(light, leaf, seed).map(|(x, n, direction)| senders.all_over(light, from(x, n), direction, each));
+    let (mut sum, mut rays) = (found.sum::<f32>(), GRID * GRID);
     for ray in 0..TOWARD_SENDERS {
         let u = point4(seed ^ 0x5e4d, ray);
         let (x, n, _) = point(light, leaf, Vec2::new(u.z, u.w));
         let choice = (ray as f32 + unit(hash(hash(seed, 0x5e), ray))) / TOWARD_SENDERS as f32;
-        let Some(toward) = senders.pick(light, choice, Vec2::new(u.x, u.y)) else { continue };
-        let Toward { leaf: sender, at, normal, weight } = toward;
-        let to = at - x;
-        let direction = to.normalize_or_zero();
-        let (cosine, cosine_there) = (n.dot(direction), -normal.dot(direction));
-        if cosine > 0.0 && cosine_there > 0.0 {
-            rays += 1;
-            if !light.scene.visibility.occluded(x, at, [surface, light.element(sender).source], &mut blocker) {
-                let counts = counts(sender, to, cosine, cosine_there);
-                sum += weight * reflected_from(light, sender, direction) / counts;
-            }
+        if let Some(found) = senders.toward(light, from(x, n), (choice, Vec2::new(u.x, u.y)), each) {
+            (sum, rays) = (sum + found, rays + 1);
         }
     }
     (sum, rays)
@@ -396,7 +378,10 @@ fn own_light<L: LightField>(light: Light<'_, L>, leaf: u32) -> Rgb {
 
 /// Light that a leaf has reflected toward where a ray in some direction comes from (π times its radiance, sum of channels).
 fn reflected_from<L: LightField>(light: Light<'_, L>, sender: u32, direction: Vec3) -> f32 {
-    (light.emitted(sender, -direction) - own_light(light, sender)).max(Rgb::ZERO).element_sum()
+    // Rays read the light itself: gains are for what links make of it.
+    let away = -direction;
+    let light_there = light.diffuse(sender, away) + light.directional(sender, away);
+    (light_there - own_light(light, sender)).max(Rgb::ZERO).element_sum()
 }
 
 /// The same by what a ray from a surface meets.
@@ -407,6 +392,7 @@ pub(crate) fn reflected_along<L: LightField>(light: Light<'_, L>, x: Vec3, direc
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::skips::tests::Echo;
     use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
     use glam::DVec3;
 
@@ -436,6 +422,33 @@ mod tests {
         let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         solver
+    }
+
+    /// What links carry is scaled to what their senders have; what these have is not.
+    #[test]
+    fn rays_find_light_as_it_is() {
+        let input = SceneInput {
+            surfaces: vec![
+                Surface::new(Shape::Quad([DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y]), 0),
+                Surface::new(
+                    Shape::Quad([DVec3::Z, DVec3::new(0.0, 1.0, 1.0), DVec3::ONE, DVec3::new(1.0, 0.0, 1.0)]),
+                    1,
+                ),
+            ],
+            materials: vec![
+                DiffuseMaterial { reflectance: Rgb::ZERO, exitance: Rgb::ZERO, two_sided: false },
+                DiffuseMaterial { reflectance: Rgb::splat(0.5), exitance: Rgb::ONE, two_sided: false },
+            ],
+            ..SceneInput::default()
+        };
+        let field = Echo { material: 0, albedo: 0.5, errs: false };
+        let mut solver = Solver::new(&input, Settings::with_error(0.1), field).expect("the plates are sound");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        let leaf = solver.elements.patch_leaves().find(|&leaf| solver.elements.nodes[leaf as usize].source == 1);
+        let leaf = leaf.expect("the lamp has leaves");
+        let as_it_is = reflected(solver.light(), leaf, 1);
+        solver.exitant.gain.fill(0.5);
+        assert!(as_it_is > 0.0 && reflected(solver.light(), leaf, 1) == as_it_is, "{as_it_is}");
     }
 
     /// Whatever links say, rays toward what they do find the same light as rays all over the hemisphere; where they are right, with less
