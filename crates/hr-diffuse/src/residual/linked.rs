@@ -98,7 +98,9 @@ impl Senders {
 
     /// The number of rays that come by a leaf over that of those all over the hemisphere, which meet its points by this kernel / π.
     fn counted<L: LightField>(&self, light: Light<'_, L>, leaf: u32, kernel: f32, rays: Rays) -> f32 {
-        rays.all_over + rays.toward * self.density(light, leaf) * PI / kernel
+        let density = self.density(light, leaf);
+        // Nothing is meant where a ray just grazes what no link knows of.
+        rays.all_over + if density > 0.0 { rays.toward * density * PI / kernel } else { 0.0 }
     }
 
     /// Per area of a leaf, the probability (density) that its points are looked at.
@@ -107,7 +109,7 @@ impl Senders {
         loop {
             let first = self.probabilities.partition_point(|&(other, _)| other < node);
             let found = self.probabilities[first..].iter().take_while(|&&(other, _)| other == node);
-            density += found.map(|(_, probability)| probability).sum::<f32>() / light.element(node).area;
+            density += found.map(|(_, probability)| probability / light.element(node).area).sum::<f32>();
             if node == 0 {
                 return density;
             }
