@@ -4,7 +4,7 @@
 //! seen by chance a little too much or too little, all over a region alike, and each bounce repeats it. Rays from all over a
 //! region know the mean, whatever the links. Few rays tell the mean of much, and little of a part; so each part is taken to be
 //! as the whole that it belongs to, as far as its own rays do not know better. Of narrow lobes few rays all over a hemisphere see the
-//! peaks: where an extension takes part half of them go where links say that light comes from.
+//! peaks: where an extension takes part some of them go where links say that light comes from.
 
 use crate::hierarchy::Elements;
 use crate::hooks::LightField;
@@ -44,8 +44,9 @@ const BELIEVED_PARTS: f64 = 10.0;
 const MOST_APART: f64 = 0.1;
 /// Parts differ by no more than so many times (squared) what is believed.
 const MOST_SPREAD: f64 = 100.0;
-/// Rays that half go all over the hemisphere, half toward senders.
-const HALF_EACH: Rays = Rays { all_over: 0.5, toward: 0.5 };
+/// One ray of so many goes where links say that light comes from; the others, all over the hemisphere, know more of what is even.
+const ONE_OF: u32 = 4;
+const RAYS: Rays = Rays { all_over: 1.0 - 1.0 / ONE_OF as f32, toward: 1.0 / ONE_OF as f32 };
 /// Places that a thread looks from between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 64;
 
@@ -150,10 +151,10 @@ pub(crate) fn calibrate<L: LightField>(
             let (from, direction) = (Place { at: x, normal: n, surface }, cosine_direction(n, u.x, u.y));
             let found = match &senders {
                 None => reflected_along(light, x, direction, surface),
-                Some(senders) if ray % 2 == seed % 2 => senders.all_over(light, from, direction, HALF_EACH),
+                Some(senders) if ray % ONE_OF != seed % ONE_OF => senders.all_over(light, from, direction, RAYS),
                 Some(senders) => {
                     let choice = unit(hash(hash(seed, 0x5e), ray));
-                    senders.toward(light, from, (choice, Vec2::new(u.x, u.y)), HALF_EACH).unwrap_or(0.0)
+                    senders.toward(light, from, (choice, Vec2::new(u.x, u.y)), RAYS).unwrap_or(0.0)
                 }
             };
             sums.add(&Sums::of(each * f64::from(found), each * f64::from(mean), variance));
