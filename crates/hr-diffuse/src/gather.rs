@@ -162,7 +162,7 @@ impl Gather {
     ) -> u64 {
         let expected = self.expected(light, links);
         let shares = light.reflected_shares();
-        let brought = light.element(0).active.then_some(Brought { links, arriving: &self.arriving, shares: &shares });
+        let brought = Brought::known(light, links, &self.arriving, &shares);
         let places = self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count();
         let reflectances = self.reflectances(light, links);
         let Some((factors, rays)) = calibrate(light, (&expected, &reflectances), brought, rays_each * places, watch)

@@ -21,6 +21,19 @@ pub(crate) struct Brought<'a> {
     pub(crate) shares: &'a [f32],
 }
 
+impl<'a> Brought<'a> {
+    /// Where an extension takes part, and what arrives is known by link.
+    pub(crate) fn known<L: LightField>(
+        light: Light<'_, L>,
+        links: &'a Links,
+        arriving: &'a [Rgb],
+        shares: &'a [f32],
+    ) -> Option<Self> {
+        let is_known = light.element(0).active && arriving.len() == links.all().len();
+        is_known.then_some(Self { links, arriving, shares })
+    }
+}
+
 /// A point that light arrives at.
 #[derive(Clone, Copy)]
 pub(crate) struct Place {

@@ -233,11 +233,9 @@ impl<L: LightField> Solver<L> {
         let count = (CHECK_SHARE * self.stats.rays as f32 / RAYS_PER_LEAF as f32) as u64;
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         let count = count.clamp(least, most) as usize;
-        let arriving = self.gather.arriving();
-        let shares = if self.elements.nodes[0].active { self.light().reflected_shares() } else { Vec::new() };
-        // What has been shot is not known by link.
-        let is_known = !shares.is_empty() && arriving.len() == self.links.all().len();
-        let brought = is_known.then_some(Brought { links: &self.links, arriving, shares: &shares });
+        let shares = self.light().reflected_shares();
+        // Of what is shot, the last of it: it comes from where all did.
+        let brought = Brought::known(self.light(), &self.links, self.gather.arriving(), &shares);
         let mut look = |count| {
             residual(self.light(), brought, count, &mut || {
                 *stopped = *stopped || watch(&progress).is_break();
