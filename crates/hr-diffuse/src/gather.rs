@@ -233,20 +233,11 @@ impl Gather {
         links: &Links,
         of: impl Fn(u32) -> f32 + Sync,
     ) -> Vec<f32> {
-        self.by_place(light, links, |link, spread| match light.element(link.sender).kind {
+        let carried = self.carried(links, |link, spread| match light.element(link.sender).kind {
             Kind::Light => 0.0,
             Kind::Cluster | Kind::Front | Kind::Back => link.factor * visible(link, spread) * of(link.sender),
-        })
-    }
-
-    /// By place, what links bring that carry what `of` says.
-    fn by_place<L: LightField>(
-        &self,
-        light: Light<'_, L>,
-        links: &Links,
-        of: impl Fn(&Link, Spread) -> f32 + Sync,
-    ) -> Vec<f32> {
-        self.on_places(light, links, &self.carried(links, of))
+        });
+        self.on_places(light, links, &carried)
     }
 
     /// By place, what arrives there of what links carry.
