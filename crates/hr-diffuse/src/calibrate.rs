@@ -8,7 +8,7 @@
 
 use crate::hierarchy::Elements;
 use crate::hooks::LightField;
-use crate::residual::{Brought, Place, Rays, Senders, reflected_along};
+use crate::residual::{Brought, Rays, ReceivingPoint, Senders, reflected_along};
 use crate::sampling::{cosine_direction, hash, point4, unit};
 use crate::segments::receiving_point;
 use crate::threads;
@@ -103,7 +103,7 @@ impl Sums {
 pub(crate) fn calibrate<L: LightField>(
     light: Light<'_, L>,
     (expected, reflectances): (&[Expected], &[f32]),
-    brought: Option<Brought<'_>>,
+    brought: Option<&Brought<'_>>,
     rays: usize,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<(Vec<f32>, u64)> {
@@ -138,7 +138,7 @@ pub(crate) fn calibrate<L: LightField>(
         .collect();
     let look = |index: usize| {
         let (Expected { place, mean, square }, (count, each)) = (expected[index], counts[index]);
-        let senders = brought.map(|brought| Senders::of(light, place, brought));
+        let senders = brought.filter(|_| count > 0).map(|brought| Senders::of(light, place, brought));
         // Rays toward senders find what is small and bright by its power.
         let square = if senders.is_some() { square.min(2.0 * mean * mean) } else { square };
         let variance = each * each * (f64::from(square) - f64::from(mean) * f64::from(mean)).max(0.0);
@@ -148,7 +148,7 @@ pub(crate) fn calibrate<L: LightField>(
             let u = point4(seed, ray);
             let on = (unit(hash(hash(seed, 0x53), ray)), Vec2::new(u.z, u.w));
             let Some((x, n, surface)) = receiving_point(light, place, on) else { continue };
-            let (from, direction) = (Place { at: x, normal: n, surface }, cosine_direction(n, u.x, u.y));
+            let (from, direction) = (ReceivingPoint { at: x, normal: n, surface }, cosine_direction(n, u.x, u.y));
             let found = match &senders {
                 None => reflected_along(light, x, direction, surface),
                 Some(senders) if ray % ONE_OF != seed % ONE_OF => senders.all_over(light, from, direction, RAYS),
@@ -391,9 +391,8 @@ mod tests {
     fn what_an_extension_reflects_is_known() {
         let solver = room_of([0.5; 2], Echo { material: 0, albedo: 0.05, errs: false });
         let (light, expected) = (solver.light(), solver.gather.expected(solver.light(), &solver.links));
-        let shares = light.reflected_shares();
-        let brought = Brought { links: &solver.links, arriving: solver.gather.arriving(), shares: &shares };
-        for (brought, missing) in [(None, 0.0), (Some(brought), 0.0), (Some(brought), 0.1)] {
+        let brought = Brought::known(light, &solver.links, solver.gather.arriving()).expect("an extension takes part");
+        for (brought, missing) in [(None, 0.0), (Some(&brought), 0.0), (Some(&brought), 0.1)] {
             let less = |of: &Expected| Expected {
                 mean: of.mean * (1.0 - missing),
                 square: of.square * (1.0 - missing).powi(2),

@@ -161,11 +161,11 @@ impl Gather {
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> u64 {
         let expected = self.expected(light, links);
-        let shares = light.reflected_shares();
-        let brought = Brought::known(light, links, &self.arriving, &shares);
+        let brought = Brought::known(light, links, &self.arriving);
         let places = self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count();
         let reflectances = self.reflectances(light, links);
-        let Some((factors, rays)) = calibrate(light, (&expected, &reflectances), brought, rays_each * places, watch)
+        let Some((factors, rays)) =
+            calibrate(light, (&expected, &reflectances), brought.as_ref(), rays_each * places, watch)
         else {
             return 0;
         };

@@ -8,7 +8,7 @@
 
 mod linked;
 
-pub(crate) use linked::{Brought, Place, Rays, Senders};
+pub(crate) use linked::{Brought, Rays, ReceivingPoint, Senders};
 
 use crate::Rgb;
 use crate::hierarchy::Kind;
@@ -88,7 +88,7 @@ struct Found {
 /// Looks at a solution from so many random leaves, if known with what its links bring; `None` where `watch` breaks.
 pub(crate) fn residual<L: LightField>(
     light: Light<'_, L>,
-    brought: Option<Brought<'_>>,
+    brought: Option<&Brought<'_>>,
     count: usize,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Residual> {
@@ -346,7 +346,7 @@ fn reflected<L: LightField>(light: Light<'_, L>, leaf: u32, seed: u32) -> f32 {
 fn reflected_by<L: LightField>(light: Light<'_, L>, senders: &Senders, leaf: u32, seed: u32) -> (f32, u32) {
     let surface = light.element(leaf).source;
     let each = Rays { all_over: (GRID * GRID) as f32, toward: TOWARD_SENDERS as f32 };
-    let from = |at, normal| Place { at, normal, surface };
+    let from = |at, normal| ReceivingPoint { at, normal, surface };
     let found = around(light, leaf, seed).map(|(x, n, direction)| senders.all_over(light, from(x, n), direction, each));
     let (mut sum, mut rays) = (found.sum::<f32>(), GRID * GRID);
     for ray in 0..TOWARD_SENDERS {
@@ -458,7 +458,6 @@ mod tests {
         let solver = dark_room();
         let (light, arriving) = (solver.light(), solver.gather.arriving());
         let wrong: Vec<Rgb> = arriving.iter().rev().copied().collect();
-        let shares = light.reflected_shares();
         let mean_and_deviation = |values: &[f64]| {
             let mean = values.iter().sum::<f64>() / values.len() as f64;
             (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt())
@@ -469,8 +468,8 @@ mod tests {
             let all_over: Vec<f64> = (0..600).map(|seed| f64::from(reflected(light, leaf, seed))).collect();
             let (mean, noise) = mean_and_deviation(&all_over);
             for (arriving, is_right) in [(arriving, true), (wrong.as_slice(), false)] {
-                let brought = Brought { links: &solver.links, arriving, shares: &shares };
-                let senders = Senders::of(light, leaf, brought);
+                let brought = Brought { links: &solver.links, arriving, shares: light.reflected_shares() };
+                let senders = Senders::of(light, leaf, &brought);
                 let toward: Vec<f64> =
                     (0..600).map(|seed| f64::from(reflected_by(light, &senders, leaf, seed).0)).collect();
                 let (found, less) = mean_and_deviation(&toward);

@@ -14,29 +14,23 @@ use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
 /// What arrives through each link, and the share of it that has been reflected, by sender.
-#[derive(Clone, Copy)]
 pub(crate) struct Brought<'a> {
     pub(crate) links: &'a Links,
     pub(crate) arriving: &'a [Rgb],
-    pub(crate) shares: &'a [f32],
+    pub(crate) shares: Vec<f32>,
 }
 
 impl<'a> Brought<'a> {
     /// Where an extension takes part, and what arrives is known by link.
-    pub(crate) fn known<L: LightField>(
-        light: Light<'_, L>,
-        links: &'a Links,
-        arriving: &'a [Rgb],
-        shares: &'a [f32],
-    ) -> Option<Self> {
+    pub(crate) fn known<L: LightField>(light: Light<'_, L>, links: &'a Links, arriving: &'a [Rgb]) -> Option<Self> {
         let is_known = light.element(0).active && arriving.len() == links.all().len();
-        is_known.then_some(Self { links, arriving, shares })
+        is_known.then(|| Self { links, arriving, shares: light.reflected_shares() })
     }
 }
 
 /// A point that light arrives at.
 #[derive(Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct ReceivingPoint {
     pub(crate) at: Vec3,
     pub(crate) normal: Vec3,
     pub(crate) surface: u32,
@@ -57,7 +51,7 @@ pub(crate) struct Senders {
 
 impl Senders {
     /// Those of a node, by what its links bring.
-    pub(crate) fn of<L: LightField>(light: Light<'_, L>, mut node: u32, brought: Brought<'_>) -> Self {
+    pub(crate) fn of<L: LightField>(light: Light<'_, L>, mut node: u32, brought: &Brought<'_>) -> Self {
         let (links, mut all) = (brought.links, 0.0);
         let mut probabilities = Vec::new();
         loop {
@@ -79,7 +73,13 @@ impl Senders {
     }
 
     /// What a ray all over the hemisphere adds to the mean reflected light (π times its radiance, sum of channels) that such rays find together.
-    pub(crate) fn all_over<L: LightField>(&self, light: Light<'_, L>, from: Place, direction: Vec3, rays: Rays) -> f32 {
+    pub(crate) fn all_over<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        from: ReceivingPoint,
+        direction: Vec3,
+        rays: Rays,
+    ) -> f32 {
         let Some((hit, sender)) = seen_along(light, from.at, direction, from.surface) else { return 0.0 };
         let cosines = from.normal.dot(direction) * hit.normal.dot(direction).abs();
         let counted = self.counted(light, sender, cosines / (hit.point - from.at).length_squared(), rays);
@@ -90,7 +90,7 @@ impl Senders {
     pub(crate) fn toward<L: LightField>(
         &self,
         light: Light<'_, L>,
-        from: Place,
+        from: ReceivingPoint,
         drawn: (f32, Vec2),
         rays: Rays,
     ) -> Option<f32> {

@@ -233,11 +233,10 @@ impl<L: LightField> Solver<L> {
         let count = (CHECK_SHARE * self.stats.rays as f32 / RAYS_PER_LEAF as f32) as u64;
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         let count = count.clamp(least, most) as usize;
-        let shares = self.light().reflected_shares();
         // Of what is shot, the last of it: it comes from where all did.
-        let brought = Brought::known(self.light(), &self.links, self.gather.arriving(), &shares);
+        let brought = Brought::known(self.light(), &self.links, self.gather.arriving());
         let mut look = |count| {
-            residual(self.light(), brought, count, &mut || {
+            residual(self.light(), brought.as_ref(), count, &mut || {
                 *stopped = *stopped || watch(&progress).is_break();
                 if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
