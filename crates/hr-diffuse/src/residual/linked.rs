@@ -99,7 +99,9 @@ impl Senders {
         let direction = to.normalize_or_zero();
         let (cosine, cosine_there) = (from.normal.dot(direction), -normal.dot(direction));
         let source = light.element(sender).source;
-        if source == from.surface || cosine <= 0.0 || cosine_there <= 0.0 {
+        // Rounding must not make what is flat a sender to itself; what is hollow is one.
+        let is_own = source == from.surface && light.scene.surfaces()[source as usize].is_polygon();
+        if is_own || cosine <= 0.0 || cosine_there <= 0.0 {
             return None;
         }
         if light.scene.visibility.occluded(from.at, at, [from.surface, source], &mut NO_BLOCKER.clone()) {
