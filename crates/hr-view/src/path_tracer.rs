@@ -14,6 +14,7 @@
 mod emitters;
 mod groups;
 mod nearby;
+mod parts;
 mod sampler;
 mod spherical;
 #[cfg(test)]

@@ -540,6 +540,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             } else {
                 nearby
             };
+            let nearby = nearby.with_parts(self.tracer.emitters(), visibility, &place, leaf.0);
             let geometry = &visibility.geometries()[element.source as usize];
             let direct = |k: u32| {
                 let uv = geometry.domain_point(element.domain, 0.5 * (k % 3) as f32, 0.5 * (k / 3) as f32);
@@ -863,7 +864,7 @@ mod tests {
         ];
         surfaces.extend((-40..40).map(|i| {
             let x = (f64::from(i) + 0.5) / 20.0;
-            Surface::new(quad([x - 0.02, x + 0.02], [-2.0, 2.0], [1.0; 2]), 0)
+            Surface::new(quad([x - 0.016, x + 0.016], [-2.0, 2.0], [1.0; 2]), 0)
         }));
         let material = |reflectance, exitance| Material {
             name: String::new(),

@@ -4,6 +4,7 @@
 use super::STEP;
 use super::groups::Groups;
 use super::nearby::Nearby;
+use super::parts::Part;
 use super::spherical::Spherical;
 use glam::{Vec2, Vec3};
 use hr_diffuse::beams::spot_ramp;
@@ -251,10 +252,11 @@ impl Emitters {
         };
         let Some(nearby) = nearby else {
             let entry = by_power(choice)?;
-            return self.shine(geometries, at, entry, u, self.chance(entry, Draws::ByPower));
+            return self.shine(geometries, at, (entry, None), u, self.chance(entry, Draws::ByPower));
         };
         let entry = nearby.pick(choice).or_else(|rest| by_power(rest).ok_or(())).ok()?;
-        let arrival = self.shine(geometries, at, entry, u, self.chance(entry, Draws::Nearby(nearby)))?;
+        let (part, u) = nearby.part(entry, u);
+        let arrival = self.shine(geometries, at, (entry, part), u, self.chance(entry, Draws::Nearby(nearby)))?;
         Some(Arrival { seen: nearby.seen(entry), ..arrival })
     }
 
@@ -270,39 +272,53 @@ impl Emitters {
         let drawn = self.groups.draw(move |number| (choice + STEP.y * number as f32).fract());
         drawn.enumerate().filter_map(move |(number, entry)| {
             let u = (u + STEP * number as f32).fract();
-            Some((number, self.shine(geometries, at, entry, u, self.groups.chance(entry))?))
+            Some((number, self.shine(geometries, at, (entry, None), u, self.groups.chance(entry))?))
         })
     }
 
-    /// The light of one emitter that is drawn with a chance.
-    pub(super) fn shine(&self, geometries: &[Geometry], at: Vec3, entry: u32, u: Vec2, chance: f32) -> Option<Arrival> {
+    /// The light of one emitter, or of a part of it, that is drawn with a chance.
+    pub(super) fn shine(
+        &self,
+        geometries: &[Geometry],
+        at: Vec3,
+        (entry, part): (u32, Option<Part>),
+        u: Vec2,
+        chance: f32,
+    ) -> Option<Arrival> {
         match &self.entries[entry as usize].source {
             Source::Surface(glow) => {
                 let geometry = &geometries[glow.surface as usize];
+                let Part { domain, chance: share } = part.unwrap_or(Part { domain: glow.domain, chance: 1.0 });
                 let facing = |front: Vec3| if glow.back { -front } else { front };
-                let (from, direction, extent, density) = if let Some(spherical) = self.spherical(geometries, entry, at)
-                {
+                let whole = self.spherical(geometries, entry, at);
+                let solid_angle = whole.as_ref().map(Spherical::solid_angle);
+                let near = |_| Spherical::new(geometry, domain, at);
+                let spherical = if part.is_some() { whole.and_then(near) } else { whole };
+                let (from, direction, distance, cosine, extent) = if let Some(spherical) = spherical {
                     let direction = spherical.direction(u)?;
-                    let (on, front) = geometry.sample(glow.domain, 0.5, 0.5);
+                    let (on, front) = geometry.sample(domain, 0.5, 0.5);
                     let normal = facing(front);
-                    let distance = (on - at).dot(normal) / direction.dot(normal);
-                    let extent = spherical.solid_angle();
-                    let shines = direction.dot(normal) < 0.0 && distance > 0.0 && distance < FAR;
-                    shines.then_some((at + direction * distance, direction, extent, extent.recip()))?
-                } else {
-                    let (from, front, weight) = geometry.sample_area(glow.domain, u.x, u.y);
-                    let to = from - at;
-                    let distance2 = to.length_squared();
-                    let direction = to / distance2.sqrt();
-                    let cosine = -facing(front).dot(direction);
-                    let shines = distance2 > 0.0 && cosine > 0.0;
+                    let cosine = -direction.dot(normal);
+                    let distance = (at - on).dot(normal) / cosine;
+                    let shines = cosine > 0.0 && distance > 0.0 && distance < FAR;
                     shines.then_some((
-                        from,
+                        at + direction * distance,
                         direction,
-                        cosine * weight / distance2,
-                        distance2 / (glow.area * cosine),
+                        distance,
+                        cosine,
+                        spherical.solid_angle(),
                     ))?
+                } else {
+                    let (from, front, weight) = geometry.sample_area(domain, u.x, u.y);
+                    let to = from - at;
+                    let distance = to.length();
+                    let direction = to / distance;
+                    let cosine = -facing(front).dot(direction);
+                    let shines = distance > 0.0 && cosine > 0.0;
+                    shines.then_some((from, direction, distance, cosine, cosine * weight / (distance * distance)))?
                 };
+                // As if all of it had been drawn from: what else finds it does not know of parts.
+                let density = solid_angle.map_or(distance * distance / (glow.area * cosine), f32::recip);
                 Some(Arrival {
                     from,
                     entry,
@@ -310,7 +326,7 @@ impl Emitters {
                     glow: self.is_glowing(entry).then_some((entry, glow.radiance.x)),
                     seen: 1.0,
                     direction,
-                    irradiance: glow.radiance * (extent / chance),
+                    irradiance: glow.radiance * (extent / (chance * share)),
                     density: self.presence(chance) * density,
                 })
             }

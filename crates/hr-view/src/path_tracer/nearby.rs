@@ -6,10 +6,12 @@
 //! them goes by power alone, so that nothing is missed whose rays were all blocked.
 
 use super::emitters::{Arrival, Emitters};
+use super::parts::{Part, Parts, divided};
 use glam::{Vec2, Vec3};
 use hr_diffuse::Visibility;
 use hr_diffuse::sampling::{hash, point2};
 use hr_diffuse::visibility::{NO_BLOCKER, Occluders, Patch};
+use std::ops::RangeInclusive;
 
 /// Share of draws that go by power alone.
 const BY_POWER: f32 = 0.1;
@@ -48,10 +50,17 @@ const FAINT: f32 = 1e-4;
 const MOST_OCCLUDERS: usize = 32;
 /// Of so small a share of all light nothing more is asked.
 const NEGLIGIBLE: f32 = 1e-3;
-/// Half shadow is even where what is seen differs by less than this share of an emitter …
+/// Emitters of which no more than this share is seen, and that bring at least this share of all light, …
+const PARTLY_SEEN: f32 = 0.95;
+const WORTH_PARTS: f32 = 0.05;
+/// … are drawn from by so many parts, …
+const PARTS: usize = 64;
+/// … each of which counts as seen by this share at least.
+const LEAST_SEEN_OF_PART: f32 = 0.05;
+/// Half shadow is even where what is seen differs by less than this share of an emitter, and of itself, …
 const UNEVEN: f32 = 0.15;
-/// … and is less than this share.
-const LIGHT: f32 = 0.9;
+/// … and is between these shares: vertices hardly know an emitter of which less is seen.
+const HALF: RangeInclusive<f32> = 0.15..=0.9;
 /// Cosine that counts at least: shading normals are bent, and places are large.
 const LEAST_COSINE: f32 = 0.05;
 
@@ -71,6 +80,8 @@ pub struct Nearby {
     outlined: Vec<(u32, Occluders)>,
     /// Share of the others in what all bring.
     rest: f32,
+    /// Of those that are drawn and large, and of which little is seen: their parts.
+    parts: Vec<(u32, Parts)>,
 }
 
 /// An emitter that is looked at.
@@ -97,20 +108,20 @@ impl Look<'_> {
         (point, if self.place.back { -front } else { front })
     }
 
-    /// What a point of an emitter, its `k`-th, brings to a point of the place, sum of channels.
-    fn brings(&self, entry: u32, (at, normal): (Vec3, Vec3), k: u32) -> Option<(f32, Arrival)> {
+    /// What a point of an emitter or of a part of it, its `k`-th, brings to a point of the place, sum of channels.
+    fn brings(&self, (entry, part): (u32, Option<Part>), (at, normal): (Vec3, Vec3), k: u32) -> Option<(f32, Arrival)> {
         let u = point2(hash(self.seed, 1 + entry), k);
-        let arrival = self.emitters.shine(self.visibility.geometries(), at, entry, u, 1.0)?;
+        let arrival = self.emitters.shine(self.visibility.geometries(), at, (entry, part), u, 1.0)?;
         let cosine = arrival.direction.dot(normal);
         (cosine > 0.0).then(|| (arrival.irradiance.element_sum() * cosine.max(LEAST_COSINE), arrival))
     }
 
     /// What an emitter brings to points, were nothing between, and what of that is seen; points of the emitter are its `first` and those
     /// after it.
-    fn shines(&self, entry: u32, points: impl Iterator<Item = (Vec3, Vec3)>, first: u32) -> [f32; 2] {
+    fn shines(&self, emitter: (u32, Option<Part>), points: impl Iterator<Item = (Vec3, Vec3)>, first: u32) -> [f32; 2] {
         let [mut all, mut open] = [0.0; 2];
         for (point, k) in points.zip(first..) {
-            let Some((brought, arrival)) = self.brings(entry, point, k) else { continue };
+            let Some((brought, arrival)) = self.brings(emitter, point, k) else { continue };
             all += brought;
             let ends = [self.place.surface, arrival.surface.unwrap_or(NO_BLOCKER)];
             if !self.visibility.occluded(point.0, arrival.from, ends, &mut { NO_BLOCKER }) {
@@ -133,7 +144,7 @@ impl Nearby {
             // Parts that glow are many and small, and so are polygons of lamps that are meshes; of what is round half may face away.
             let is_small = emitters.is_glowing(entry) || is_mesh && emitters.is_flat(entry, visibility.geometries());
             let looks = if is_small { 2 } else { RAYS };
-            let light = |k: u32| look.brings(entry, points[k as usize], k).map(|(light, _)| light);
+            let light = |k: u32| look.brings((entry, None), points[k as usize], k).map(|(light, _)| light);
             (0..looks).filter_map(light).sum::<f32>() / looks as f32
         };
         let mut found: Vec<_> =
@@ -141,10 +152,10 @@ impl Nearby {
         found.sort_by(|a, b| b.light.total_cmp(&a.light));
         let strong = STRONG * found.iter().map(|found| found.light).sum::<f32>();
         for Found { entry, light, seen } in found.iter_mut().take(LOOKED_AT) {
-            let [mut all, mut open] = look.shines(*entry, points.into_iter(), 0);
+            let [mut all, mut open] = look.shines((*entry, None), points.into_iter(), 0);
             *light = all / RAYS as f32;
             if open == 0.0 && *light >= strong {
-                let more = look.shines(*entry, rim.iter().flat_map(|&point| [point; RIM_RAYS]), RAYS);
+                let more = look.shines((*entry, None), rim.iter().flat_map(|&point| [point; RIM_RAYS]), RAYS);
                 [all, open] = [all + more[0], open + more[1]];
             }
             if all > 0.0 {
@@ -176,7 +187,35 @@ impl Nearby {
             half_shadow,
             outlined: Vec::new(),
             rest: 1.0,
+            parts: Vec::new(),
         }
+    }
+
+    /// Finds out, by rays, which parts are seen of surfaces that emit, bring much, and are drawn from: those whose occluders are not all known.
+    #[must_use]
+    pub fn with_parts(mut self, emitters: &Emitters, visibility: &Visibility, place: &Patch, seed: u32) -> Self {
+        if self.is_all_outlined() {
+            return self;
+        }
+        let look = Look { emitters, visibility, place, seed };
+        for at in 0..self.entries.len() {
+            let entry = self.entries[at];
+            let is_worth = self.seen[at] <= PARTLY_SEEN && self.share(at) >= WORTH_PARTS && !self.is_outlined(entry);
+            let Some(patch) = emitters.patch(entry).filter(|_| is_worth) else { continue };
+            let domains = divided(&visibility.geometries()[patch.surface as usize], patch.domain, PARTS);
+            let points = (0..RAYS).map(|k| look.point(point2(hash(seed, 0), k)));
+            let found: Vec<_> = (domains.iter().zip(1..))
+                .map(|(&domain, part)| {
+                    look.shines((entry, Some(Part { domain, chance: 1.0 })), points.clone(), part * RAYS)
+                })
+                .collect();
+            // Those that shine at no point that was looked at may do so at others.
+            let mean = found.iter().map(|[all, _]| all).sum::<f32>() / found.len() as f32;
+            let weight = |[all, open]: [f32; 2]| open.max(LEAST_SEEN_OF_PART * all.max(mean));
+            let weighed: Vec<_> = domains.into_iter().zip(found.into_iter().map(weight)).collect();
+            self.parts.extend(Parts::new(&weighed).map(|parts| (entry, parts)));
+        }
+        self
     }
 
     /// Finds all that may hide parts of emitters from the place, of those that bring most first, as long as that is not too much.
@@ -238,13 +277,16 @@ impl Nearby {
             return false;
         }
         let (low, high) = brought.fold((f32::INFINITY, 0.0f32), |(low, high), light| (low.min(light), high.max(light)));
-        high > 0.0 && high - low < UNEVEN * self.half_shadow && high < LIGHT * self.half_shadow
+        high - low < UNEVEN * self.half_shadow.min(2.0 * high) && HALF.contains(&(high / self.half_shadow))
     }
 
     /// The emitters that bring much, of which some ray saw something, and the share that is seen of each.
     pub(super) fn surely_seen(&self) -> impl Iterator<Item = (u32, f32)> {
-        let brings_much =
-            |&at: &usize| self.share(at) >= MUCH && self.seen[at] > LEAST_SEEN && !self.is_outlined(self.entries[at]);
+        let brings_much = |&at: &usize| {
+            let entry = self.entries[at];
+            let is_drawn_evenly = !self.is_outlined(entry) && self.parts_of(entry).is_none();
+            self.share(at) >= MUCH && self.seen[at] > LEAST_SEEN && is_drawn_evenly
+        };
         (0..self.entries.len()).filter(brings_much).map(|at| (self.entries[at], self.seen[at]))
     }
 
@@ -252,6 +294,19 @@ impl Nearby {
     pub(super) fn is_shaded(&self) -> bool {
         let is_shaded = |at: usize| self.seen[at] > LEAST_SEEN && self.seen[at] < 1.0;
         (0..self.entries.len()).any(|at| is_shaded(at) && !self.is_outlined(self.entries[at]))
+    }
+
+    fn parts_of(&self, entry: u32) -> Option<&Parts> {
+        let at = self.parts.binary_search_by_key(&entry, |(entry, _)| *entry).ok()?;
+        Some(&self.parts[at].1)
+    }
+
+    /// The part of an emitter that is to be drawn from, if it has parts, and the place there, for a pair of numbers in 0…1.
+    pub(super) fn part(&self, entry: u32, u: Vec2) -> (Option<Part>, Vec2) {
+        self.parts_of(entry).map_or((None, u), |parts| {
+            let (part, u) = parts.pick(u);
+            (Some(part), u)
+        })
     }
 
     /// Share of an emitter that is seen, about, > 0.
@@ -323,6 +378,66 @@ mod tests {
         let [strong, weak] =
             [2, 3].map(|surface| chances[tracer.emitters().of_surface(surface).expect("it shines") as usize]);
         assert!(weak > strong, "hidden: {strong}, seen: {weak}");
+    }
+
+    /// Of a sky behind a window in a wall, which is seen from near by in a corner only, draws of parts bring what draws of all of it do, with half of the noise.
+    #[test]
+    fn parts_that_are_seen_are_drawn_from() {
+        let mut scene = hidden_lamp();
+        let p = |x: f64, y: f64, z: f64| glam::dvec3(x, y, z);
+        let flat = |z: f64, [x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| {
+            hr_diffuse::Shape::Quad([p(x0, y0, z), p(x1, y0, z), p(x1, y1, z), p(x0, y1, z)])
+        };
+        let mut surfaces = vec![scene.surfaces[0].clone(); 5];
+        surfaces[0].shape = flat(0.0, [-0.2, 0.2], [-0.2, 0.2]);
+        for (surface, (x, y)) in surfaces[1..].iter_mut().zip([
+            ([-6.0, -0.3], [-6.0, 6.0]),
+            ([0.3, 6.0], [-6.0, 6.0]),
+            ([-0.3, 0.3], [-6.0, -0.3]),
+            ([-0.3, 0.3], [0.3, 6.0]),
+        ]) {
+            surface.shape = flat(1.0, x, y);
+        }
+        let mut sky = scene.surfaces[2].clone();
+        sky.shape = flat(2.0, [-4.0, 4.0], [-4.0, 4.0]);
+        surfaces.push(sky);
+        scene.surfaces = surfaces;
+        let rays = visibility(&scene).expect("sound");
+        let tracer = PathTracer::new(&scene, &rays);
+        let ground = Patch { surface: 0, domain: hr_diffuse::Domain::WHOLE, back: false };
+        let all = Nearby::new(tracer.emitters(), &rays, &ground, 3);
+        let by_parts = all.clone().with_parts(tracer.emitters(), &rays, &ground, 3);
+        assert!(all.parts.is_empty() && by_parts.parts.len() == 1);
+        let (point, normal) = rays.geometries()[0].sample(ground.domain, 0.3, 0.6);
+        let hit = rays.closest(point + normal * 0.01, -normal, 0.0, 1.0).expect("the ground");
+        let found = [&all, &by_parts].map(|nearby| {
+            const DRAWS: u32 = 8192;
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for i in 0..DRAWS {
+                let light = tracer.irradiance(&hit, -normal, &Sampler::new(5, i), Some(nearby)).x;
+                (sum, squares) = (sum + light, squares + light * light);
+            }
+            let mean = sum / DRAWS as f32;
+            (mean, (squares / DRAWS as f32 - mean * mean).sqrt())
+        });
+        let exact = all.with_occluders(tracer.emitters(), &rays, &ground);
+        let exact = tracer.outlined(&hit, -normal, &exact).x;
+        let [(mean, noise), (mean_by_parts, less_noise)] = found;
+        assert!((mean_by_parts - exact).abs() < 0.02 * exact, "{mean_by_parts}, {mean}, exactly {exact}");
+        assert!(less_noise < 0.55 * noise, "{less_noise}, without parts {noise}");
+    }
+
+    /// Of an emitter of which little is seen all the difference may be in that.
+    #[test]
+    fn half_shadow_is_even_by_what_is_seen() {
+        let nearby = Nearby { half_shadow: 10.0, ..Nearby::default() };
+        let is_even = |brought: [f32; 3]| nearby.is_even_half_shadow(brought.into_iter());
+        assert!(is_even([5.0, 5.5, 5.2]) && is_even([2.4, 3.0, 3.1]));
+        assert!(
+            !is_even([2.0, 3.0, 2.5]) && !is_even([1.0, 1.1, 1.05]),
+            "shadows that one would see, or vertices do not know"
+        );
+        assert!(!is_even([9.5, 9.5, 9.5]) && !is_even([0.0; 3]), "light, and none");
     }
 
     /// Where some emitters are cut out and others drawn, all of their light arrives, and nothing is drawn of the former by what is known.
