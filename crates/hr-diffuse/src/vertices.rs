@@ -4,12 +4,10 @@
 //! Where light changes from a leaf to the next, edges have vertices in their middles, too.
 
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
-use crate::sampling::hash;
 use crate::{Domain, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::{SmallVec, smallvec};
 use std::collections::HashMap;
-use std::hash::{Hash, Hasher};
 
 /// Light is gathered this far from a vertex toward the middle of its leaf: on an edge or in a corner of a room the
 /// horizon and the rays would graze the neighbouring surface.
@@ -139,29 +137,13 @@ impl Vertices {
     }
 }
 
-/// What makes two corners the same vertex. Exact, as dyadic points on a shared edge are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Key {
-    place: [u32; 3],
-    normal: [i8; 3],
-    material: u32,
-}
+/// What makes two corners the same vertex: place, normal, material. Exact, as dyadic points on a shared edge are.
+type Key = ([u32; 3], [i8; 3], u32);
 
-impl Key {
-    fn new(position: Vec3, normal: Vec3, material: u32) -> Self {
-        // Adding zero makes −0 the same as 0.
-        let place = (position + Vec3::ZERO).to_array().map(f32::to_bits);
-        Self { place, normal: (normal * 60.0).round().to_array().map(|c| c as i8), material }
-    }
-}
-
-/// One number instead of seven: all corners of all leaves are looked up, many times while leaves are split.
-impl Hash for Key {
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        let ([x, y, z], [a, b, c]) = (self.place, self.normal.map(i8::cast_unsigned));
-        let rest = u32::from_le_bytes([a, b, c, 0]) ^ self.material.rotate_left(24);
-        state.write_u32(hash(hash(hash(x, y), z), rest));
-    }
+fn key(position: Vec3, normal: Vec3, material: u32) -> Key {
+    // Adding zero makes −0 the same as 0.
+    let bits = (position + Vec3::ZERO).to_array().map(f32::to_bits);
+    (bits, (normal * 60.0).round().to_array().map(|c| c as i8), material)
 }
 
 /// A point of an element as display sees it: position and normal on the element's side.
@@ -227,7 +209,7 @@ impl<'a> Corners<'a> {
 
     fn key(&self, leaf: u32, uv: Vec2) -> (Key, (Vec3, Vec3)) {
         let (position, normal) = point_on(self.scene, self.elements, leaf, uv);
-        (Key::new(position, normal, self.elements.nodes[leaf as usize].material), (position, normal))
+        (key(position, normal, self.elements.nodes[leaf as usize].material), (position, normal))
     }
 
     /// The vertex at a point of a leaf.
