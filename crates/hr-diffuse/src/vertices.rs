@@ -266,17 +266,16 @@ impl<'a> Corners<'a> {
         let outline = |part: usize| {
             let (leaf, corners) = self.around(part);
             let at = |uv: Vec2| self.at(leaf, uv);
-            let vertices: SmallVec<[Option<u32>; 4]> = corners.iter().map(|&uv| at(uv)).collect();
             let mut outline = Outline::new();
             for (i, &a) in corners.iter().enumerate() {
-                let next = (i + 1) % corners.len();
+                let b = corners[(i + 1) % corners.len()];
                 // An edge that is one point, such as a pole, has no inner vertices.
-                let ends = [vertices[i], vertices[next]];
+                let ends = [at(a), at(b)];
                 if let Some(vertex) = ends[0] {
                     outline.push(Corner { vertex, uv: a });
                 }
                 let find = |uv: Vec2| at(uv).filter(|vertex| !ends.contains(&Some(*vertex)));
-                along_edge(a, corners[next], EDGE_DEPTH, &find, &mut outline);
+                along_edge(a, b, EDGE_DEPTH, &find, &mut outline);
             }
             (leaf, outline)
         };
