@@ -852,7 +852,8 @@ mod tests {
         assert!(known > 1000, "{known}");
     }
 
-    /// A ground below slats that hide all but a fifth of a wide lamp, as of a sky behind blinds, and how a camera sees it.
+    /// A ground below slats that hide all but a third of a wide lamp, as of a sky behind blinds, and how a camera sees it. Of much less that is
+    /// seen vertices are not believed.
     fn below_slats() -> (Scene, Camera) {
         let quad = |x: [f64; 2], y: [f64; 2], z: [f64; 2]| {
             let p = |i: usize, j: usize| DVec3::new(x[i], y[j], z[i]);

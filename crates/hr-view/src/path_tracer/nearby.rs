@@ -380,7 +380,7 @@ mod tests {
         assert!(weak > strong, "hidden: {strong}, seen: {weak}");
     }
 
-    /// Of a sky behind a window in a wall, which is seen from near by in a corner only, draws of parts bring what draws of all of it do, with half of the noise.
+    /// Of a sky behind a window in a wall, which is seen from near by in a corner only, draws of parts bring what draws of all of it do, with little more than half of the noise.
     #[test]
     fn parts_that_are_seen_are_drawn_from() {
         let mut scene = hidden_lamp();
