@@ -79,9 +79,9 @@ fn is_partly_shut_in<L: LightField>(light: Light<'_, L>, tolerance: Tolerance, l
         return (false, 0);
     }
     // A few directions tell of most leaves that they are as open everywhere.
-    let few = look.differs(|direction| direction % (DIRECTIONS + 1) == 0);
-    let differs = if few < SOFT { 0.0 } else { look.differs(|_| true) };
-    (differs > SOFT && most * differs > least, look.rays)
+    let is_split = look.differs(|direction| direction % (DIRECTIONS + 1) == 0, |share| share >= SOFT)
+        && look.differs(|_| true, |share| share > SOFT && most * share > least);
+    (is_split, look.rays)
 }
 
 /// A leaf that is looked at.
@@ -107,18 +107,18 @@ impl<L: LightField> Look<'_, L> {
         self.light.scene.visibility.any_in(&region, |other| other != source)
     }
 
-    /// By how much the share of directions in which there is light from afar differs from one point of the leaf to another, of those that
-    /// are `asked`.
-    fn differs(&mut self, asked: impl Fn(u32) -> bool) -> f32 {
+    /// Whether the share of directions in which there is light from afar differs from one point of the leaf to another by what `counts`, of
+    /// those directions that are `asked`.
+    fn differs(&mut self, asked: impl Fn(u32) -> bool, counts: impl Fn(f32) -> bool) -> bool {
         let directions = (0..DIRECTIONS * DIRECTIONS).filter(|&direction| asked(direction));
         let count = directions.clone().count();
         let (mut least, mut greatest) = (count, 0);
-        for point in 0..SIDE * SIDE {
+        (0..SIDE * SIDE).any(|point| {
             let place = self.place(point);
             let open = directions.clone().filter(|&direction| self.sees_afar(place, direction)).count();
             (least, greatest) = (least.min(open), greatest.max(open));
-        }
-        (greatest - least) as f32 / count as f32
+            counts((greatest - least) as f32 / count as f32)
+        })
     }
 
     /// A point of the leaf, with its normal.

@@ -72,19 +72,16 @@ pub(crate) fn is_touched(scene: &SceneData, elements: &Elements, side: Side) -> 
     };
     scene.visibility.any_in(&region, |other| {
         let dark = [2 * other, 2 * other + 1].map(|side| is_dark(scene, elements, side));
-        other != side / 2 && dark != [false; 2] && covers(&scene.surfaces()[other as usize], dark, geometry, &region)
+        other != side / 2 && dark != [false; 2] && covers(&scene.surfaces()[other as usize], dark, geometry)
     })
 }
 
-/// Whether a surface of which some sides are dark may cover part of one, about which is a region. Of two polygons, the
-/// one reaches into the region, and the other has corners where a dark side looks.
-fn covers(surface: &Geometry, dark: [bool; 2], covered: &Geometry, region: &Region) -> bool {
-    let (Some([low, high]), Some((normal, height))) = (surface.heights(region.normal), plane(surface, 0)) else {
-        return true;
-    };
+/// Whether a surface of which some sides are dark may cover part of one that it is near. Of two polygons, the other has
+/// corners where a dark side looks.
+fn covers(surface: &Geometry, dark: [bool; 2], covered: &Geometry) -> bool {
+    let Some((normal, height)) = plane(surface, 0) else { return true };
     let Some([behind, before]) = covered.heights(normal) else { return true };
-    let reaches = high > region.heights[0] && low < region.heights[1];
-    reaches && (dark[0] && before > height + ASIDE || dark[1] && behind < height - ASIDE)
+    dark[0] && before > height + ASIDE || dark[1] && behind < height - ASIDE
 }
 
 /// The plane of a polygon: its unit normal on a side, and its height along it.

@@ -115,9 +115,8 @@ fn faces_nothing(scene: &SceneData, side: Side) -> bool {
     let above = x.dot(normal) + FLUSH;
     let bounds = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
     let region = Region { bounds, normal, heights: [above, f32::INFINITY] };
-    let rises = |surface: u32| scene.surfaces()[surface as usize].heights(normal).is_none_or(|[_, high]| high > above);
     let unlit = (0..scene.lights.len()).all(|light| light_segment(scene, light, x, normal).1 <= 0.0);
-    unlit && !scene.visibility.any_in(&region, rises)
+    unlit && !scene.visibility.any_in(&region, |_| true)
 }
 
 /// The unit normal of a flat surface on one of its sides.

@@ -70,15 +70,27 @@ pub(crate) fn sew<L: LightField>(
     watch: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> u64 {
     let (mut rays, lobes) = (0, Lobes::new(light.elements, light.faint, light.field));
+    // By node, the corners of the outline in which no edge was found: none is found as long as it gets no more.
+    let mut whole: Vec<u32> = Vec::new();
     loop {
         let (reader, leaves) = (light.read(), outlines(light.scene, light.elements).parts);
+        whole.resize(light.elements.nodes.len(), 0);
         let look = |(leaf, outline): &(u32, Outline)| {
-            let (torn, rays) = is_torn(reader, (links, &lobes), tolerance, *leaf, outline);
-            (torn.then_some(*leaf), u64::from(rays))
+            if whole[*leaf as usize] == outline.len() as u32 {
+                return (false, 0);
+            }
+            is_torn(reader, (links, &lobes), tolerance, *leaf, outline)
         };
         let looked = threads::map(&leaves, 64, look);
-        rays += looked.iter().map(|(_, rays)| rays).sum::<u64>();
-        let torn: Vec<u32> = looked.into_iter().filter_map(|(leaf, _)| leaf).collect();
+        rays += looked.iter().map(|(_, rays)| u64::from(*rays)).sum::<u64>();
+        let mut torn: Vec<u32> = Vec::new();
+        for ((leaf, outline), (is_torn, _)) in leaves.iter().zip(looked) {
+            if is_torn {
+                torn.push(*leaf);
+            } else {
+                whole[*leaf as usize] = outline.len() as u32;
+            }
+        }
         if torn.is_empty() || watch(light.elements.nodes.len() as u64).is_break() {
             return rays;
         }

@@ -4,10 +4,12 @@
 //! Where light changes from a leaf to the next, edges have vertices in their middles, too.
 
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
+use crate::sampling::hash;
 use crate::{Domain, Rgb};
 use glam::{Vec2, Vec3};
 use smallvec::{SmallVec, smallvec};
 use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
 
 /// Light is gathered this far from a vertex toward the middle of its leaf: on an edge or in a corner of a room the
 /// horizon and the rays would graze the neighbouring surface.
@@ -137,13 +139,29 @@ impl Vertices {
     }
 }
 
-/// What makes two corners the same vertex: place, normal, material. Exact, as dyadic points on a shared edge are.
-type Key = ([u32; 3], [i8; 3], u32);
+/// What makes two corners the same vertex. Exact, as dyadic points on a shared edge are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Key {
+    place: [u32; 3],
+    normal: [i8; 3],
+    material: u32,
+}
 
-fn key(position: Vec3, normal: Vec3, material: u32) -> Key {
-    // Adding zero makes −0 the same as 0.
-    let bits = (position + Vec3::ZERO).to_array().map(f32::to_bits);
-    (bits, (normal * 60.0).round().to_array().map(|c| c as i8), material)
+impl Key {
+    fn new(position: Vec3, normal: Vec3, material: u32) -> Self {
+        // Adding zero makes −0 the same as 0.
+        let place = (position + Vec3::ZERO).to_array().map(f32::to_bits);
+        Self { place, normal: (normal * 60.0).round().to_array().map(|c| c as i8), material }
+    }
+}
+
+/// One number instead of seven: all corners of all leaves are looked up, many times while leaves are split.
+impl Hash for Key {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        let ([x, y, z], [a, b, c]) = (self.place, self.normal.map(i8::cast_unsigned));
+        let rest = u32::from_le_bytes([a, b, c, 0]) ^ self.material.rotate_left(24);
+        state.write_u32(hash(hash(hash(x, y), z), rest));
+    }
 }
 
 /// A point of an element as display sees it: position and normal on the element's side.
@@ -209,7 +227,7 @@ impl<'a> Corners<'a> {
 
     fn key(&self, leaf: u32, uv: Vec2) -> (Key, (Vec3, Vec3)) {
         let (position, normal) = point_on(self.scene, self.elements, leaf, uv);
-        (key(position, normal, self.elements.nodes[leaf as usize].material), (position, normal))
+        (Key::new(position, normal, self.elements.nodes[leaf as usize].material), (position, normal))
     }
 
     /// The vertex at a point of a leaf.
@@ -266,16 +284,17 @@ impl<'a> Corners<'a> {
         let outline = |part: usize| {
             let (leaf, corners) = self.around(part);
             let at = |uv: Vec2| self.at(leaf, uv);
+            let vertices: SmallVec<[Option<u32>; 4]> = corners.iter().map(|&uv| at(uv)).collect();
             let mut outline = Outline::new();
             for (i, &a) in corners.iter().enumerate() {
-                let b = corners[(i + 1) % corners.len()];
+                let next = (i + 1) % corners.len();
                 // An edge that is one point, such as a pole, has no inner vertices.
-                let ends = [at(a), at(b)];
+                let ends = [vertices[i], vertices[next]];
                 if let Some(vertex) = ends[0] {
                     outline.push(Corner { vertex, uv: a });
                 }
                 let find = |uv: Vec2| at(uv).filter(|vertex| !ends.contains(&Some(*vertex)));
-                along_edge(a, b, EDGE_DEPTH, &find, &mut outline);
+                along_edge(a, corners[next], EDGE_DEPTH, &find, &mut outline);
             }
             (leaf, outline)
         };

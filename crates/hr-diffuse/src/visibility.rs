@@ -111,6 +111,15 @@ pub(crate) struct Region {
     pub(crate) heights: [f32; 2],
 }
 
+impl Region {
+    /// Whether the box of a surface reaches into its own, and the surface between its heights.
+    fn meets(&self, surface: &Geometry) -> bool {
+        let [least, most] = self.heights;
+        let is_between = || surface.heights(self.normal).is_none_or(|[low, high]| low <= most && least <= high);
+        surface.bounds(Domain::WHOLE).overlaps(&self.bounds) && is_between()
+    }
+}
+
 /// Points up to a height along a normal, for tests of boxes side by side.
 struct HalfSpace {
     normal: Vec3,
@@ -414,11 +423,13 @@ impl Visibility {
         }
     }
 
-    /// Whether any surface whose box, about, reaches into a region is `wanted`.
-    pub(crate) fn any_in(&self, region: &Region, wanted: impl FnMut(u32) -> bool) -> bool {
+    /// Whether any surface whose box reaches into a region is `wanted`.
+    pub(crate) fn any_in(&self, region: &Region, mut wanted: impl FnMut(u32) -> bool) -> bool {
         let [least, most] = region.heights;
         let sides = [HalfSpace::new(region.normal, most), HalfSpace::new(-region.normal, -least)];
-        self.any_within(&region.bounds, &sides, wanted)
+        // Those that share a leaf of the tree have one box there.
+        let reaches = |surface: u32| region.meets(&self.geometries[surface as usize]);
+        self.any_within(&region.bounds, &sides, |surface| reaches(surface) && wanted(surface))
     }
 
     /// Whether any surface whose box, about, reaches into a box and all of some half-spaces is `wanted`.
