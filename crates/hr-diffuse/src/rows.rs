@@ -22,6 +22,9 @@ pub(crate) const RAYS: u32 = GRID * GRID;
 const UNCERTAIN: f32 = 0.05;
 /// Factors are raised by at most this: where more is missing, it is not known from where.
 pub(crate) const MOST_RAISE: f32 = 1.5;
+/// Where a row is off by a little, the light that it brings is off by about this share of that: much of it is chance in how much is seen of
+/// this sender or that, which may be brighter than the others or darker.
+const TELLS: f32 = 0.3;
 /// Of senders that take up this share of the view some ray would meet one.
 const SURELY_SEEN: f32 = 0.12;
 
@@ -145,11 +148,51 @@ impl Row {
         let sum = self.emitters + rest * correction.rest;
         let least = if seen.closed { MOST_RAISE.recip() } else { 1.0 };
         correction.all = sum.max(least).recip();
+        correction.rest = told(correction.rest);
         correction
     }
+}
+
+/// What a row that is to be changed by some factor tells of the light that it brings: near 1 but a share of the change, and nothing is left
+/// where there is nothing to see.
+fn told(factor: f32) -> f32 {
+    factor / (factor + TELLS * (1.0 - factor))
 }
 
 /// What is nearest to `row` of all that a share may be of which `seen` was seen.
 fn within_band(row: f32, seen: f32) -> f32 {
     row.clamp((seen - UNCERTAIN).max(0.0), (seen + UNCERTAIN).min(1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a place in an enclosure, without emitters, is to be multiplied by, all of whose links know it, if they sum to this.
+    fn rest(sum: f32) -> f32 {
+        let seen = Seen { shares: Row { own: 1.0, ..Row::default() }, closed: true, covered: false };
+        Row { own: sum, ..Row::default() }.correction(&seen).rest
+    }
+
+    #[test]
+    fn rows_that_are_off_by_little_tell_little() {
+        assert_eq!(rest(1.0), 1.0);
+        for (sum, told) in [(0.9, 0.033), (1.1, -0.030), (1.25, -0.070)] {
+            assert!((rest(sum) - 1.0 - told).abs() < 5e-3, "{sum}: {}", rest(sum));
+        }
+    }
+
+    #[test]
+    fn nothing_arrives_where_nothing_is_seen() {
+        let seen = |own| Seen { shares: Row { own, ..Row::default() }, ..Seen::default() };
+        let row = Row { own: 0.8, ..Row::default() };
+        let [none, little, more] = [0.0, 0.1, 0.4].map(|own| row.correction(&seen(own)).rest);
+        assert!(none < 0.2 && none < little && little < more && more < 1.0, "{none}, {little}, {more}");
+        let emitters = Row { emitters: 1.0, own: 0.3, inherited: 0.0 };
+        assert_eq!(
+            emitters.correction(&Seen { closed: true, ..Seen::default() }).rest,
+            0.0,
+            "emitters are all there is"
+        );
+    }
 }
