@@ -53,6 +53,8 @@ pub(crate) const MOST_LEAVING: f32 = 0.25;
 /// … and so many whether it has a window, if it is so large (radius in unit space); fewer, by area, of smaller ones.
 const MOST_WINDOW_RAYS: usize = 16_384;
 const LARGEST: f32 = 0.25;
+/// More than the diagonal of unit space, which a scene fills.
+const BEYOND: f32 = 2.0;
 
 /// No spot.
 const NONE: u32 = u32::MAX;
@@ -295,19 +297,25 @@ impl<'a> Spots<'a> {
         let bounds = Aabb::of_points(spots.iter().filter_map(|&spot| self.place(spot)));
         let size = (bounds.radius() / LARGEST).min(1.0);
         let rays = ((MOST_WINDOW_RAYS as f32 * size * size) as usize).max(FIRST_WINDOW_RAYS);
-        let leaves = |ray: &usize| {
+        let mut blocker = NO_BLOCKER;
+        let mut leaves = |ray: &usize| {
             let spot = spots[ray % spots.len()];
             let Spot { side, at, .. } = self.all[spot as usize];
+            let own = side / 2;
             let n = outward(&self.scene.surfaces()[(side / 2) as usize], side);
             let u = point4(hash(spot, 0x0be2), *ray as u32);
             let direction = cosine_direction(n, u.z, u.w);
+            // Nearly all meet something, and what it is does not matter.
+            if self.scene.visibility.occluded(at, at + direction * BEYOND, [own, own], &mut blocker) {
+                return false;
+            }
             let (a, b) = n.any_orthonormal_pair();
             // Rays that slip through between surfaces that nearly meet have none beside them.
             [Vec3::ZERO, a * BESIDE, b * BESIDE]
                 .into_iter()
-                .all(|aside| self.scene.visibility.first_side(at, direction + aside, f32::MAX, side / 2).is_none())
+                .all(|aside| self.scene.visibility.first_side(at, direction + aside, f32::MAX, own).is_none())
         };
-        let first = (0..FIRST_WINDOW_RAYS).filter(leaves).count();
+        let first = (0..FIRST_WINDOW_RAYS).filter(&mut leaves).count();
         let is_interior = first as f32 <= MOST_LEAVING * FIRST_WINDOW_RAYS as f32;
         is_interior && (first > 0 || (FIRST_WINDOW_RAYS..rays).any(|ray| leaves(&ray)))
     }
