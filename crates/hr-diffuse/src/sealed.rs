@@ -12,7 +12,7 @@ use crate::geometry::{Aabb, Domain, Geometry};
 use crate::hierarchy::SceneData;
 use crate::rooms::{Rooms, rooms};
 use crate::sampling::{cosine_direction, hash, point2, point4};
-use crate::segments::light_segment;
+use crate::segments::{DISTANT, light_segment};
 use crate::threads;
 use crate::visibility::{NO_BLOCKER, Region};
 use crate::{Light, Rgb};
@@ -53,8 +53,6 @@ pub(crate) const MOST_LEAVING: f32 = 0.25;
 /// … and so many whether it has a window, if it is so large (radius in unit space); fewer, by area, of smaller ones.
 const MOST_WINDOW_RAYS: usize = 16_384;
 const LARGEST: f32 = 0.25;
-/// More than the diagonal of unit space, which a scene fills.
-const BEYOND: f32 = 2.0;
 
 /// No spot.
 const NONE: u32 = u32::MAX;
@@ -302,11 +300,11 @@ impl<'a> Spots<'a> {
             let spot = spots[ray % spots.len()];
             let Spot { side, at, .. } = self.all[spot as usize];
             let own = side / 2;
-            let n = outward(&self.scene.surfaces()[(side / 2) as usize], side);
+            let n = outward(&self.scene.surfaces()[own as usize], side);
             let u = point4(hash(spot, 0x0be2), *ray as u32);
             let direction = cosine_direction(n, u.z, u.w);
             // Nearly all meet something, and what it is does not matter.
-            if self.scene.visibility.occluded(at, at + direction * BEYOND, [own, own], &mut blocker) {
+            if self.scene.visibility.occluded(at, at + direction * DISTANT, [own, own], &mut blocker) {
                 return false;
             }
             let (a, b) = n.any_orthonormal_pair();
