@@ -51,15 +51,23 @@ pub(crate) fn gains<L: LightField>(
             power[element.parent as usize] += power[node];
         }
     }
-    // Shares of it that the links of a node and of its ancestors carry, and the most of that over the leaves below.
+    // Shares of it that the links of a node and of its ancestors carry, the mean over the leaves below: what they carry too much of one
+    // leaf's, another has left. Were it the most, a single leaf would take from all that is carried of the others.
     let mut share = vec![0.0_f32; nodes.len()];
     for (node, element) in nodes.iter().enumerate() {
         let own = if power[node] > 0.0 { carried[node] / power[node] } else { 0.0 };
         share[node] = own + if node > 0 { share[element.parent as usize] } else { 0.0 };
     }
-    for node in (1..nodes.len()).rev() {
-        let parent = nodes[node].parent as usize;
-        share[parent] = share[parent].max(share[node]);
+    let mut together = vec![0.0_f32; nodes.len()];
+    for (node, element) in nodes.iter().enumerate().rev() {
+        if element.child_count == 0 {
+            together[node] = share[node] * power[node];
+        } else if power[node] > 0.0 {
+            share[node] = together[node] / power[node];
+        }
+        if node > 0 {
+            together[element.parent as usize] += together[node];
+        }
     }
     let mut gains: Vec<f32> = share.into_iter().map(|share| share.max(1.0).recip()).collect();
     let sent = |leaf: usize| irradiance[leaf] * albedos[nodes[leaf].material as usize];
@@ -115,6 +123,7 @@ struct Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::links::Link;
     use crate::skips::tests::Echo;
     use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
     use glam::DVec3;
@@ -165,6 +174,30 @@ mod tests {
         let (freely, reined) = (allowed(FREELY), allowed(STRICTLY));
         let exact = STRICTLY * MOST_GAIN * GLOSSY / (FREELY * (1.0 - DIFFUSE));
         assert!((reined / freely - exact).abs() < 1e-3, "{reined} and {freely}");
+    }
+
+    /// What the links of one leaf carry too much is cut off of them, not of what is carried of all leaves around it together.
+    #[test]
+    fn one_leaf_does_not_take_from_all() {
+        let solver = solver();
+        let (light, nodes) = (solver.light(), &solver.elements.nodes);
+        let is_leaf = |part: u32| nodes[part as usize].child_count == 0;
+        let divided = |element: &Element| {
+            let mut parts = element.first_child..element.first_child + element.child_count;
+            element.is_patch() && !parts.is_empty() && parts.all(is_leaf)
+        };
+        let whole = nodes.iter().position(divided).expect("floor or ceiling are divided");
+        let leaf = nodes[whole].first_child as usize;
+        let link = |sender: usize| Link { receiver: 0, sender: sender as u32, factor: 1.0, visibility: 1.0 };
+        let links = Links::new(vec![link(leaf), link(whole)], nodes.len());
+        // Twice what the leaf has, of a whole that has four times as much; what that sends is little.
+        let has = FREELY * (1.0 - DIFFUSE) * nodes[leaf].area;
+        let carries = |link: &Link| Rgb::X * 3.0 * has * if link.sender as usize == leaf { 2.0 } else { 0.1 };
+        let directional: Vec<Rgb> = links.all().iter().map(carries).collect();
+        let (irradiance, most) = (vec![Rgb::ONE; nodes.len()], vec![FREELY; nodes.len()]);
+        let gains = gains(light, &links, (&directional, &[1.0; 2]), &most, (&irradiance, &[Rgb::splat(GLOSSY)]));
+        assert!(gains[leaf] < 0.8, "{}", gains[leaf]);
+        assert!(gains[whole] >= 1.0, "{}", gains[whole]);
     }
 
     /// What is cut off of one leaf is sent by its neighbours, as far as they have it, and not where light went on growing.
