@@ -15,7 +15,7 @@ use crate::transport::Light;
 /// Of what a leaf does not reflect diffusely, links may carry so much as directional light at first. What the links of a
 /// sender carry errs either way; to cut it off at what is right on average would lose light.
 pub(crate) const FREELY: f32 = 1.4;
-/// With this, light dies out in any scene.
+/// With this, light dies out in nearly any scene; where it does not, [`feedback`](crate::feedback) lets less of what arrives count.
 pub(crate) const STRICTLY: f32 = 0.9;
 /// Where light went on growing, it is also no more than this times what an extension's mean albedo makes of what arrives: from some
 /// directions more is reflected than from others.
