@@ -51,8 +51,8 @@ pub(crate) fn gains<L: LightField>(
             power[element.parent as usize] += power[node];
         }
     }
-    // Shares of it that the links of a node and of its ancestors carry, the mean over the leaves below: what they carry too much of one
-    // leaf's, another has left. Were it the most, a single leaf would take from all that is carried of the others.
+    // Shares of it that the links of a node and of its ancestors carry, the mean over the leaves below: what is too much for one leaf,
+    // another has left. Were it the most, a single leaf would take from what is carried of all the others.
     let mut share = vec![0.0_f32; nodes.len()];
     for (node, element) in nodes.iter().enumerate() {
         let own = if power[node] > 0.0 { carried[node] / power[node] } else { 0.0 };
