@@ -136,6 +136,12 @@ impl Rays {
         (self.corner + self.right * x + self.down * y).normalize()
     }
 
+    /// How wide a pixel is in the middle of the picture at distance 1.
+    #[must_use]
+    pub fn pixel(&self) -> f32 {
+        self.right.length() as f32
+    }
+
     /// The same through a place (0…1) within a pixel.
     #[must_use]
     pub fn within(&self, x: usize, y: usize, place: Vec2) -> Vec3 {

@@ -2,14 +2,18 @@
 //! Removal Using Polygon Area Sorting", 1977), and the form factors of what is left add up (Nishita, Nakamae: "Continuous Tone
 //! Representation of Three-Dimensional Objects Taking Account of Shadows and Interreflection", 1985).
 //!
-//! From all points of a patch the same few polygons may be in the way, which a [shaft](super::shaft) finds once. No ray is shot.
+//! From all points of a patch the same few polygons may be in the way, which a [shaft](super::shaft) finds once; and spheres, cylinders
+//! and cones, whose outlines each point sees as other polygons. No ray is shot.
+
+mod round;
 
 use super::pieces::{Corners, Pieces, Sides};
 use super::shaft::{End, Proof, Shaft};
 use super::{NO_BLOCKER, Visibility};
 use crate::form_factor::{IN_PLANE, Part, in_front, lambert, outline};
-use crate::geometry::Domain;
+use crate::geometry::{Domain, Geometry};
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
+use round::{Before, Round, Viewers, disk};
 use smallvec::SmallVec;
 
 /// One side of a part of a surface.
@@ -32,11 +36,16 @@ pub struct Occluders {
     ends: Vec<u32>,
     /// The plane of each: unit normal, and distance from the zero point.
     planes: Vec<Vec4>,
+    /// What else may hide parts of the sender.
+    round: Vec<Round>,
 }
 
+/// It takes as long to cut out a round body as so many polygons.
+const ROUND_COSTS: usize = 2;
+
 impl Visibility {
-    /// What may hide parts of a polygon that sends light from the points of a patch that it shines at. `None` where the sender or
-    /// something in the way is curved, or where more than `most` polygons are.
+    /// What may hide parts of a polygon that sends light from the points of a patch that it shines at. `None` where the sender is curved, what is in the
+    /// way is a torus, a ring or around the patch, or takes more time than `most` polygons.
     #[must_use]
     pub fn occluders(&self, receiver: &Patch, sender: &Patch, most: usize) -> Option<Occluders> {
         let part = |patch: &Patch| Part {
@@ -48,7 +57,9 @@ impl Visibility {
         if !to.geometry.is_polygon() {
             return None;
         }
-        if !is_facing(from, to) || !is_facing(to, from) {
+        let (outline, normal) = outline(to);
+        let is_before = |point: Vec3| normal.dot(point.as_dvec3() - outline[0]) > 0.0;
+        if !corners(from).any(is_before) || !is_facing(to, from) {
             return Some(Occluders::default());
         }
         // Surfaces that cannot hide their own points.
@@ -63,19 +74,49 @@ impl Visibility {
             Proof::Free => SmallVec::new(),
             Proof::Among(hiding) => hiding,
         };
-        let (outline, normal) = outline(to);
         let mut occluders = Occluders::default();
         occluders.push(&outline);
+        let viewers = Viewers::new(corners(from).map(|corner| corner.as_dvec3()).collect());
+        let mut polygons: Vec<(f64, SmallVec<[DVec3; 5]>)> = Vec::new();
         for surface in hiding {
-            let polygon = self.geometries()[surface as usize].polygon()?;
-            let polygon: Corners = polygon.iter().map(|corner| corner.as_dvec3()).collect();
             // What is behind the sender hides nothing of it.
-            let before = in_front(&polygon, outline[0], normal);
-            if before.len() >= 3 {
-                occluders.push(&before);
+            match outlined(&self.geometries()[surface as usize], &viewers)? {
+                Outlined::Polygon(polygon) => {
+                    let before = in_front(&polygon, outline[0], normal);
+                    if before.len() >= 3 {
+                        polygons.push((solid_angle(&before, viewers.middle), before));
+                    }
+                }
+                Outlined::Round(round) => match round.before(normal, normal.dot(outline[0]))? {
+                    Before::Nothing => {}
+                    Before::Round(round) => occluders.round.push(round),
+                },
             }
         }
-        Some(occluders)
+        // What is large leaves fewer pieces for the others to cut.
+        polygons.sort_by(|a, b| b.0.total_cmp(&a.0));
+        polygons.iter().for_each(|(_, polygon)| occluders.push(polygon));
+        (occluders.cost() <= most + 1).then_some(occluders)
+    }
+}
+
+/// What a point sees of a surface, whichever side.
+enum Outlined {
+    /// The same from everywhere.
+    Polygon(SmallVec<[DVec3; 5]>),
+    Round(Round),
+}
+
+/// That of a surface, as it is to all viewers.
+fn outlined(geometry: &Geometry, viewers: &Viewers) -> Option<Outlined> {
+    match geometry {
+        Geometry::Triangle(_) | Geometry::Quad(_) => {
+            let corners = geometry.polygon()?.iter();
+            Some(Outlined::Polygon(corners.map(|corner| corner.as_dvec3()).collect()))
+        }
+        Geometry::Revolution(surface) => disk(surface)
+            .map(|corners| Outlined::Polygon(corners.collect()))
+            .or_else(|| Round::of(surface, viewers).map(Outlined::Round)),
     }
 }
 
@@ -85,12 +126,17 @@ fn is_facing(part: Part<'_>, polygon: Part<'_>) -> bool {
         return true;
     }
     let (outline, normal) = outline(polygon);
-    let is_before = |point: Vec3| normal.dot(point.as_dvec3() - outline[0]) > 0.0;
-    if part.geometry.is_polygon() {
-        part.geometry.corners(part.domain).iter().any(|&uv| is_before(part.geometry.point(uv)))
+    corners(part).any(|point| normal.dot(point.as_dvec3() - outline[0]) > 0.0)
+}
+
+/// Points between which all of a part is.
+fn corners(part: Part<'_>) -> impl Iterator<Item = Vec3> {
+    let corners: SmallVec<[Vec3; 8]> = if part.geometry.is_polygon() {
+        part.geometry.corners(part.domain).iter().map(|&uv| part.geometry.point(uv)).collect()
     } else {
-        part.geometry.bounds(part.domain).corners().into_iter().any(is_before)
-    }
+        part.geometry.bounds(part.domain).corners().into_iter().collect()
+    };
+    corners.into_iter()
 }
 
 fn end(Part { geometry, domain, back }: Part<'_>) -> End {
@@ -106,14 +152,14 @@ impl Occluders {
         self.ends.push(self.corners.len() as u32);
     }
 
-    /// How many polygons there are: none where nothing of the sender is seen, else the sender and those in the way.
+    /// How many polygons take as long: none where nothing of the sender is seen, else the sender and those in the way.
     #[must_use]
-    pub fn polygons(&self) -> usize {
-        self.planes.len()
+    pub fn cost(&self) -> usize {
+        self.planes.len() + ROUND_COSTS * self.round.len()
     }
 
     /// Form factor (0…1) from the point `x` of the patch, in unit space, to what is seen from there of the sender, by the unit normal `n`, which may be a
-    /// shading normal, above the horizon of the surface's own `normal`. Right to rounding, some 1e-6; it takes time in proportion to the polygons in the way, and to the
+    /// shading normal, above the horizon of the surface's own `normal`. Right to rounding, some 1e-6, where what is in the way is no disk, and not round either: circles are polygons of the same area. It takes time in proportion to the polygons in the way, and to the
     /// pieces that they leave.
     #[must_use]
     pub fn visible_factor(&self, x: Vec3, [n, normal]: [Vec3; 2]) -> f32 {
@@ -126,23 +172,26 @@ impl Occluders {
         if n != normal {
             sender = in_front(&sender, DVec3::ZERO, normal.as_dvec3()).into_iter().collect();
         }
-        let view = Sides::new(&sender, false);
-        let mut pieces = Pieces::of(&sender);
-        let (mut polygon, mut sides) = (Corners::new(), Sides::default());
+        let mut seen = Seen::new(sender);
+        let mut polygon = Corners::new();
         for occluder in 1..self.planes.len() {
             let height = height(occluder);
-            if height.abs() <= IN_PLANE {
-                // Seen edge-on.
-                continue;
+            // Others are seen edge-on.
+            if height.abs() > IN_PLANE {
+                self.seen_from(x, occluder, &mut polygon);
+                if seen.may_be_hidden(&polygon, height < 0.0) {
+                    seen.pieces.cut(&seen.hiding);
+                }
             }
-            self.seen_from(x, occluder, &mut polygon);
-            // What is beside all of the sender leaves its pieces whole, too.
-            if !view.are_clear_of(&polygon) && sides.meet(&polygon, height < 0.0, &sender) {
-                pieces.cut(&sides);
+        }
+        for round in &self.round {
+            let away = round.seen_from(x.as_dvec3(), &mut polygon);
+            if seen.may_be_hidden(&polygon, away) {
+                seen.hide_but(&round.openings(x.as_dvec3()));
             }
         }
         let n = n.as_dvec3();
-        pieces.iter().map(|piece| lambert(n, piece.iter().copied())).sum::<f64>().min(1.0) as f32
+        seen.pieces.iter().map(|piece| lambert(n, piece.iter().copied())).sum::<f64>().min(1.0) as f32
     }
 
     /// A polygon as it is seen from a point, in the place of another one.
@@ -152,6 +201,47 @@ impl Occluders {
         polygon.clear();
         corners.iter().for_each(|corner| polygon.push(corner.as_dvec3() - x.as_dvec3()));
     }
+}
+
+/// What a point sees of a sender.
+struct Seen {
+    sender: Corners,
+    /// What is inside of these is before all of it, or behind.
+    sides: Sides,
+    pieces: Pieces,
+    /// Of what hid some of it last: saves allocations.
+    hiding: Sides,
+}
+
+impl Seen {
+    fn new(sender: Corners) -> Self {
+        let pieces = Pieces::of(&sender);
+        Self { sides: Sides::new(&sender, false), sender, pieces, hiding: Sides::default() }
+    }
+
+    /// Whether a polygon, whose normal points away from the point or not, is before some of the sender: it is what hides it next.
+    fn may_be_hidden(&mut self, polygon: &[DVec3], away: bool) -> bool {
+        // What is beside all of the sender leaves its pieces whole, too.
+        !self.sides.are_clear_of(polygon) && self.hiding.meet(polygon, away, &self.sender)
+    }
+
+    /// Takes away what is behind that, but for what is seen through both of two openings.
+    fn hide_but(&mut self, openings: &Option<[(Corners, bool); 2]>) {
+        let through = match openings.as_ref().map(|openings| self.pieces.within(openings)) {
+            Some(None) => return,
+            Some(through) => through,
+            None => None,
+        };
+        self.pieces.cut(&self.hiding);
+        through.iter().flatten().for_each(|piece| self.pieces.push(piece));
+    }
+}
+
+/// About what a small polygon takes of what is seen from a point.
+fn solid_angle(polygon: &[DVec3], x: DVec3) -> f64 {
+    let middle = polygon.iter().sum::<DVec3>() / polygon.len() as f64 - x;
+    let doubled: DVec3 = polygon.windows(2).skip(1).map(|p| (p[0] - polygon[0]).cross(p[1] - polygon[0])).sum();
+    doubled.dot(middle).abs() / middle.length().powi(3).max(f64::MIN_POSITIVE)
 }
 
 /// Unit normal of a polygon.

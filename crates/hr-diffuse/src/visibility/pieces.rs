@@ -2,6 +2,7 @@
 //!
 //! This is where the light of outlined emitters takes its time, so nothing is moved or allocated that need not be.
 
+use crate::form_factor::in_front;
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -9,7 +10,7 @@ use smallvec::SmallVec;
 const THIN: f64 = 1e-7;
 
 /// The corners of a convex polygon.
-pub(super) type Corners = SmallVec<[DVec3; 8]>;
+pub(super) type Corners = SmallVec<[DVec3; 24]>;
 
 /// Convex polygons.
 #[derive(Default)]
@@ -42,6 +43,32 @@ impl Pieces {
                 self.push_outside(piece, sides);
             }
         }
+    }
+
+    /// What of each is within two convex polygons, whose normals point away from the zero point or not; `None` where all of them are.
+    pub(super) fn within(&self, polygons: &[(Corners, bool); 2]) -> Option<SmallVec<[Corners; 2]>> {
+        let sides = || polygons.iter().flat_map(|(polygon, away)| sides(polygon, *away));
+        let (mut all, mut inner) = (true, SmallVec::new());
+        for piece in self.iter() {
+            let mut left = Corners::from_slice(piece);
+            for side in sides() {
+                if is_beyond(&side, &left) {
+                    left.clear();
+                } else if left.iter().any(|&corner| at(&side, corner) == At::Outside) {
+                    left = in_front(&left, DVec3::ZERO, side.0).into_iter().collect();
+                } else {
+                    continue;
+                }
+                all = false;
+                if left.is_empty() {
+                    break;
+                }
+            }
+            if left.len() >= 3 {
+                inner.push(left);
+            }
+        }
+        (!all).then_some(inner)
     }
 
     /// Adds what of a convex polygon is beyond any of some sides.
@@ -88,7 +115,8 @@ impl Pieces {
         self.close(start);
     }
 
-    fn push(&mut self, piece: &[DVec3]) {
+    /// Adds one.
+    pub(super) fn push(&mut self, piece: &[DVec3]) {
         let start = self.corners.len();
         self.corners.extend_from_slice(piece);
         self.close(start);

@@ -47,7 +47,7 @@ const LEAST_SEEN: f32 = 0.1;
 /// Emitters that bring less than this of all are left to power.
 const FAINT: f32 = 1e-4;
 /// Polygons in the way of emitters that a place may have, at most, and emitters: more take longer than rays do.
-const MOST_OCCLUDERS: usize = 32;
+const MOST_OCCLUDERS: usize = 128;
 /// Of so small a share of all light nothing more is asked.
 const NEGLIGIBLE: f32 = 1e-3;
 /// Emitters of which no more than this share is seen, and that bring at least this share of all light, …
@@ -80,6 +80,8 @@ pub struct Nearby {
     outlined: Vec<(u32, Occluders)>,
     /// Share of the others in what all bring.
     rest: f32,
+    /// Whether some of the others bring much, and are polygons of which parts are hidden: from parts of the place less is in the way.
+    lacks_outlines: bool,
     /// Of those that are drawn and large, and of which little is seen: their parts.
     parts: Vec<(u32, Parts)>,
 }
@@ -187,6 +189,7 @@ impl Nearby {
             half_shadow,
             outlined: Vec::new(),
             rest: 1.0,
+            lacks_outlines: false,
             parts: Vec::new(),
         }
     }
@@ -234,11 +237,17 @@ impl Nearby {
             }
             let found = emitters.patch(entry).and_then(|sender| visibility.occluders(place, &sender, left - 1));
             if let Some(occluders) = found {
-                left -= occluders.polygons();
+                left -= occluders.cost();
                 self.outlined.push((entry, occluders));
             }
         }
         self.outlined.sort_unstable_by_key(|(entry, _)| *entry);
+        let lacks_outline = |at: usize| {
+            let is_worth = self.seen[at] < 1.0 && shares[at] >= MUCH && !self.is_outlined(self.entries[at]);
+            let sender = emitters.patch(self.entries[at]).filter(|_| is_worth);
+            sender.is_some_and(|sender| visibility.geometries()[sender.surface as usize].is_polygon())
+        };
+        self.lacks_outlines = (0..shares.len()).any(lacks_outline);
         let is_drawn: Vec<bool> = self.entries.iter().map(|&entry| !self.is_outlined(entry)).collect();
         let mut sum = 0.0;
         for ((so_far, share), is_drawn) in self.sums.iter_mut().zip(&shares).zip(is_drawn) {
@@ -267,6 +276,12 @@ impl Nearby {
     #[must_use]
     pub fn is_all_outlined(&self) -> bool {
         self.rest <= NEGLIGIBLE
+    }
+
+    /// Whether emitters bring much whose light would be known without chance if less were in the way.
+    #[must_use]
+    pub fn lacks_outlines(&self) -> bool {
+        self.lacks_outlines
     }
 
     /// Whether emitters that are all partly seen light the place about evenly, by what they are said to bring (irradiance, sum of

@@ -33,6 +33,8 @@ pub(super) struct Shared {
     pub(super) ray: (Vec3, Vec3),
     /// What is seen there, once it is asked for.
     pub(super) middle: Option<Option<Shaded>>,
+    /// How wide pixels are at distance 1; infinite where there are none.
+    pub(super) pixel: f32,
 }
 
 impl Default for Shared {
@@ -44,14 +46,20 @@ impl Default for Shared {
             incident: Vec::new(),
             ray: Default::default(),
             middle: None,
+            pixel: f32::INFINITY,
         }
     }
 }
 
 impl Shared {
+    /// That of pixels which are so wide at distance 1.
+    pub(super) fn of(pixel: f32) -> Self {
+        Self { pixel, ..Self::default() }
+    }
+
     /// Begins a pixel, given the ray through its middle.
     pub(super) fn begin(&mut self, ray: (Vec3, Vec3)) {
-        *self = Self { ray, incident: std::mem::take(&mut self.incident), ..Self::default() };
+        *self = Self { ray, incident: std::mem::take(&mut self.incident), ..Self::of(self.pixel) };
     }
 
     /// After the corners: what the other rays need that all pixels have.

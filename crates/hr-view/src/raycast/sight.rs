@@ -52,6 +52,11 @@ impl<'a> Sight<'a> {
         self.columns.clone()
     }
 
+    /// How wide pixels are at distance 1.
+    pub(super) fn pixel(&self) -> f32 {
+        self.rays.pixel()
+    }
+
     pub(super) fn rows(&self) -> Range<usize> {
         self.rows.clone()
     }

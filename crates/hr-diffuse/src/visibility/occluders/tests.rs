@@ -52,9 +52,30 @@ fn by_rays(visibility: &Visibility, (x, n): (Vec3, Vec3), own: u32, sender: u32)
     (0..RAYS).filter(sees).count() as f32 / RAYS as f32
 }
 
+/// A lamp in a can that reaches below it, and above: what is seen of it is what rays find.
+#[test]
+fn lamps_in_cans_are_seen_from_below() {
+    let small = Surface { flip: false, ..above([-0.01, 0.01], [-0.01, 0.01], 0.0) };
+    let lamp = above([0.15, 0.45], [-0.15, 0.15], 1.0);
+    let can = Shape::Cone { ends: [0.8, 1.1].map(|z| dvec3(0.3, 0.0, z)), radii: [0.25; 2] };
+    let (visibility, found) = between(&[small, lamp, Surface::new(can, 0)]);
+    let found = found.expect("flat, in a tube");
+    for x in [0.0, 0.2, -0.3] {
+        let x = vec3(x, 0.0, 0.0);
+        let (seen, expected) = (found.visible_factor(x, [Vec3::Z; 2]), by_rays(&visibility, (x, Vec3::Z), 0, 1));
+        assert!((seen - expected).abs() < 0.003, "{x}: {seen}, by rays {expected}");
+    }
+}
+
 /// A triangle or quadrilateral anywhere, of those that are made of all kinds.
 fn polygon() -> impl Strategy<Value = Surface> {
     surface().prop_filter("curved", |surface| matches!(surface.shape, Shape::Triangle(_) | Shape::Quad(_)))
+}
+
+/// A ball, cylinder or cone anywhere.
+fn round() -> impl Strategy<Value = Surface> {
+    surface()
+        .prop_filter("flat, or a torus", |surface| matches!(surface.shape, Shape::Sphere { .. } | Shape::Cone { .. }))
 }
 
 proptest! {
@@ -79,6 +100,25 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(192))]
+
+    /// So is what round bodies leave, whose circles are polygons of the same area.
+    #[test]
+    fn what_round_bodies_leave_is_what_is_seen(
+        (receiver, sender) in (surface(), polygon()),
+        others in prop::collection::vec(round(), 1..3),
+        place in [0.02f32..0.98, 0.02..0.98],
+    ) {
+        let geometries: Vec<Geometry> = [receiver, sender].iter().chain(&others).map(geometry).collect();
+        let visibility = Visibility::new(&geometries);
+        let Some(occluders) = visibility.occluders(&front(0), &front(1), 12) else { return Ok(()) };
+        let (x, n) = geometries[0].sample(Domain::WHOLE, place[0], place[1]);
+        let (found, expected) = (occluders.visible_factor(x, [n; 2]), by_rays(&visibility, (x, n), 0, 1));
+        prop_assert!((found - expected).abs() < 0.02, "{found}, by rays {expected}");
+    }
+}
+
 #[test]
 fn what_is_hidden_is_cut_off_exactly() {
     let lamp = above([-0.5, 0.5], [-0.5, 0.5], 1.0);
@@ -86,7 +126,7 @@ fn what_is_hidden_is_cut_off_exactly() {
     let seen = |others: &[Surface]| {
         let surfaces: Vec<Surface> = [ground(), lamp.clone()].iter().chain(others).cloned().collect();
         let found = between(&surfaces).1.expect("polygons, and few");
-        (found.polygons(), found.visible_factor(x, up))
+        (found.cost(), found.visible_factor(x, up))
     };
     let left_of = |edge: f32| point_to_polygon(x, Vec3::Z, &rectangle([-0.5, edge], [-0.5, 0.5], 1.0));
     let close = |found: f32, expected: f32| assert!((found - expected).abs() < 1e-6, "{found}, not {expected}");
@@ -132,13 +172,57 @@ fn below_the_horizon_nothing_is_seen() {
     assert_eq!(found.visible_factor(Vec3::X, [-Vec3::X, Vec3::Z]), 0.0, "from behind it");
 }
 
+/// Below a lamp: a ball, a leg, a shade from beside and from far below, a disk.
 #[test]
-fn what_is_curved_or_too_much_is_left_to_rays() {
+fn round_bodies_hide_what_rays_find_hidden() {
+    let lamp = above([-0.5, 0.5], [-0.5, 0.5], 1.0);
+    let small = Surface { flip: false, ..above([-0.01, 0.01], [-0.01, 0.01], 0.0) };
+    let cone = |[x0, z0, r0]: [f64; 3], [x1, z1, r1]: [f64; 3]| {
+        Surface::new(Shape::Cone { ends: [dvec3(x0, 0.0, z0), dvec3(x1, 0.0, z1)], radii: [r0, r1] }, 0)
+    };
+    let ball = Shape::Sphere { center: dvec3(0.1, 0.1, 0.5), radius: 0.2 };
+    let disk = Shape::Ring { center: dvec3(0.2, 0.1, 0.4), normal: dvec3(0.6, 0.0, 0.8), inner: 0.0, outer: 0.15 };
+    for (what, other) in [
+        ("ball", Surface::new(ball, 0)),
+        ("disk", Surface::new(disk, 0)),
+        ("leg", cone([0.1, 0.2, 0.03], [0.1, 0.8, 0.03])),
+        ("lying", cone([-0.3, 0.4, 0.1], [0.4, 0.5, 0.1])),
+        ("shade", cone([0.3, 0.3, 0.1], [0.3, 0.8, 0.02])),
+        ("tube from below", cone([0.0, 0.2, 0.1], [0.1, 0.5, 0.12])),
+        ("wide tube", cone([0.05, 0.7, 0.3], [0.05, 0.75, 0.3])),
+        ("funnel", cone([-0.1, 0.3, 0.02], [-0.1, 0.6, 0.2])),
+        ("shade from below", cone([0.02, 0.4, 0.2], [0.02, 0.6, 0.08])),
+        ("tip", cone([0.0, 0.3, 0.0], [0.0, 0.6, 0.2])),
+        ("pointed", cone([-0.3, 0.5, 0.08], [0.1, 0.6, 0.0])),
+    ] {
+        let (visibility, found) = between(&[small.clone(), lamp.clone(), other]);
+        let found = found.expect("round, and seen from outside");
+        let x = Vec3::ZERO;
+        let whole = point_to_polygon(x, Vec3::Z, &rectangle([-0.5, 0.5], [-0.5, 0.5], 1.0));
+        let (seen, expected) = (found.visible_factor(x, [Vec3::Z; 2]), by_rays(&visibility, (x, Vec3::Z), 0, 1));
+        assert!(seen < 0.99 * whole, "{what}: it hides some of it");
+        assert!((seen - expected).abs() < 0.006, "{what}: {seen}, by rays {expected}");
+    }
+}
+
+#[test]
+fn what_has_no_outline_or_too_much_is_left_to_rays() {
     let lamp = above([-0.5, 0.5], [-0.5, 0.5], 1.0);
     let ball = |z: f64| Surface::new(Shape::Sphere { center: dvec3(0.0, 0.0, z), radius: 0.2 }, 0);
-    assert!(between(&[ground(), lamp.clone(), ball(0.5)]).1.is_none(), "a ball in the way");
+    let tube = |x: f64, radius: f64| {
+        let ends = [0.4, 0.6].map(|z| dvec3(x, 0.0, z));
+        Shape::Cone { ends, radii: [radius; 2] }
+    };
+    let is_found = |other: Surface| between(&[ground(), lamp.clone(), other]).1.is_some();
+    let around = |radius: f64| Shape::Cone { ends: [-0.1, 0.6].map(|z| dvec3(0.0, 0.0, z)), radii: [radius; 2] };
+    assert!(!is_found(Surface::new(around(2.0), 0)), "around the ground");
+    assert!(is_found(Surface::new(tube(0.0, 0.2), 0)), "between");
+    assert!(!is_found(ball(1.0)), "half above the lamp");
+    assert!(!is_found(ball(0.1)), "it holds some of the ground");
+    let torus = Shape::Torus { center: dvec3(0.0, 0.0, 0.5), axis: dvec3(0.0, 0.0, 1.0), major: 0.2, minor: 0.05 };
+    assert!(!is_found(Surface::new(torus, 0)), "a torus");
     assert!(between(&[ground(), ball(0.5)]).1.is_none(), "a ball that shines");
-    assert!(between(&[ground(), lamp.clone(), ball(2.0)]).1.is_some(), "a ball elsewhere");
+    assert!(is_found(ball(2.0)), "a ball elsewhere");
     assert!(between(&[ball(0.5), lamp.clone()]).1.is_some(), "a ball that is lit");
     let chips = |count: u32| (0..count).map(|i| above([-0.1, 0.1], [-0.1, 0.1], 0.2 + 0.02 * f64::from(i)));
     for (count, is_found) in [(8, true), (9, false)] {
@@ -148,5 +232,5 @@ fn what_is_curved_or_too_much_is_left_to_rays() {
     // What faces away sends nothing, whatever is between.
     let away = Surface { flip: false, ..lamp };
     let surfaces: Vec<Surface> = [ground(), away].into_iter().chain(chips(9)).collect();
-    assert_eq!(between(&surfaces).1.expect("known").polygons(), 0);
+    assert_eq!(between(&surfaces).1.expect("known").cost(), 0);
 }
