@@ -46,8 +46,9 @@ const MUCH: f32 = 0.01;
 const LEAST_SEEN: f32 = 0.1;
 /// Emitters that bring less than this of all are left to power.
 const FAINT: f32 = 1e-4;
-/// Polygons in the way of emitters that a place may have, at most, and emitters: more take longer than rays do.
-const MOST_OCCLUDERS: usize = 128;
+/// Polygons in the way of emitters that a place may have, at most, and emitters: more take longer than rays do. So do more than the
+/// first of these where there are rays all the same, to emitters that bring more and have no outlines.
+const MOST_OCCLUDERS: [usize; 2] = [32, 128];
 /// Of so small a share of all light nothing more is asked.
 const NEGLIGIBLE: f32 = 1e-3;
 /// Emitters of which no more than this share is seen, and that bring at least this share of all light, …
@@ -80,7 +81,7 @@ pub struct Nearby {
     outlined: Vec<(u32, Occluders)>,
     /// Share of the others in what all bring.
     rest: f32,
-    /// Whether some of the others bring much, and are polygons of which parts are hidden: from parts of the place less is in the way.
+    /// Whether most light of the others that are seen in part is that of polygons, and much: from parts of the place less is in the way.
     lacks_outlines: bool,
     /// Of those that are drawn and large, and of which little is seen: their parts.
     parts: Vec<(u32, Parts)>,
@@ -230,7 +231,17 @@ impl Nearby {
         let known = order.into_iter().map(|at| self.entries[at]);
         // A few rays may have missed that an emitter is seen from a corner of the place.
         let others = (0..emitters.len() as u32).filter(|entry| self.entries.binary_search(entry).is_err());
-        let mut left = MOST_OCCLUDERS;
+        let has_outline = |entry: u32| {
+            let sender = emitters.patch(entry);
+            sender.is_some_and(|sender| visibility.geometries()[sender.surface as usize].is_polygon())
+        };
+        // Draws make noise where emitters are seen in part.
+        let noisy = |has: bool| {
+            let is_noisy = |at: &usize| self.seen[*at] < 1.0 && has_outline(self.entries[*at]) == has;
+            (0..shares.len()).filter(is_noisy).map(|at| shares[at]).sum::<f32>()
+        };
+        let [without, with] = [false, true].map(noisy);
+        let mut left = MOST_OCCLUDERS[usize::from(with > without)];
         for entry in known.chain(others) {
             if left == 0 {
                 break;
@@ -242,12 +253,10 @@ impl Nearby {
             }
         }
         self.outlined.sort_unstable_by_key(|(entry, _)| *entry);
-        let lacks_outline = |at: usize| {
-            let is_worth = self.seen[at] < 1.0 && shares[at] >= MUCH && !self.is_outlined(self.entries[at]);
-            let sender = emitters.patch(self.entries[at]).filter(|_| is_worth);
-            sender.is_some_and(|sender| visibility.geometries()[sender.surface as usize].is_polygon())
-        };
-        self.lacks_outlines = (0..shares.len()).any(lacks_outline);
+        let lacks = |at: usize| self.seen[at] < 1.0 && !self.is_outlined(self.entries[at]);
+        let lacking: f32 =
+            (0..shares.len()).filter(|&at| lacks(at) && has_outline(self.entries[at])).map(|at| shares[at]).sum();
+        self.lacks_outlines = lacking >= MUCH && lacking > without;
         let is_drawn: Vec<bool> = self.entries.iter().map(|&entry| !self.is_outlined(entry)).collect();
         let mut sum = 0.0;
         for ((so_far, share), is_drawn) in self.sums.iter_mut().zip(&shares).zip(is_drawn) {
@@ -278,7 +287,7 @@ impl Nearby {
         self.rest <= NEGLIGIBLE
     }
 
-    /// Whether emitters bring much whose light would be known without chance if less were in the way.
+    /// Whether emitters bring much, and more than others that are seen in part, whose light would be known without chance if less were in the way.
     #[must_use]
     pub fn lacks_outlines(&self) -> bool {
         self.lacks_outlines
