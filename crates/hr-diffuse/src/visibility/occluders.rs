@@ -40,12 +40,12 @@ pub struct Occluders {
     round: Vec<Round>,
 }
 
-/// It takes as long to cut out a round body as so many polygons.
+/// A round body is counted as so many polygons.
 const ROUND_COSTS: usize = 2;
 
 impl Visibility {
-    /// What may hide parts of a polygon that sends light from the points of a patch that it shines at. `None` where the sender is curved, what is in the
-    /// way is a torus, a ring or around the patch, or takes more time than `most` polygons.
+    /// What may hide parts of a polygon that sends light from the points of a patch that it shines at. `None` where the sender is curved,
+    /// what is in the way is a torus, a ring or around the patch, or takes more time than `most` polygons.
     #[must_use]
     pub fn occluders(&self, receiver: &Patch, sender: &Patch, most: usize) -> Option<Occluders> {
         let part = |patch: &Patch| Part {
@@ -57,9 +57,7 @@ impl Visibility {
         if !to.geometry.is_polygon() {
             return None;
         }
-        let (outline, normal) = outline(to);
-        let is_before = |point: Vec3| normal.dot(point.as_dvec3() - outline[0]) > 0.0;
-        if !corners(from).any(is_before) || !is_facing(to, from) {
+        if !is_facing(from, to) || !is_facing(to, from) {
             return Some(Occluders::default());
         }
         // Surfaces that cannot hide their own points.
@@ -74,6 +72,7 @@ impl Visibility {
             Proof::Free => SmallVec::new(),
             Proof::Among(hiding) => hiding,
         };
+        let (outline, normal) = outline(to);
         let mut occluders = Occluders::default();
         occluders.push(&outline);
         let viewers = Viewers::new(corners(from).map(|corner| corner.as_dvec3()).collect());
@@ -159,8 +158,8 @@ impl Occluders {
     }
 
     /// Form factor (0…1) from the point `x` of the patch, in unit space, to what is seen from there of the sender, by the unit normal `n`, which may be a
-    /// shading normal, above the horizon of the surface's own `normal`. Right to rounding, some 1e-6, where what is in the way is no disk, and not round either: circles are polygons of the same area. It takes time in proportion to the polygons in the way, and to the
-    /// pieces that they leave.
+    /// shading normal, above the horizon of the surface's own `normal`. Right to rounding, some 1e-6, where only polygons are in the way;
+    /// circles count as polygons of the same area. It takes time in proportion to what is in the way, and to the pieces that this leaves.
     #[must_use]
     pub fn visible_factor(&self, x: Vec3, [n, normal]: [Vec3; 2]) -> f32 {
         let height = |polygon: usize| self.planes[polygon].xyz().dot(x) - self.planes[polygon].w;
@@ -179,14 +178,14 @@ impl Occluders {
             // Others are seen edge-on.
             if height.abs() > IN_PLANE {
                 self.seen_from(x, occluder, &mut polygon);
-                if seen.may_be_hidden(&polygon, height < 0.0) {
+                if seen.meets(&polygon, height < 0.0) {
                     seen.pieces.cut(&seen.hiding);
                 }
             }
         }
         for round in &self.round {
             let away = round.seen_from(x.as_dvec3(), &mut polygon);
-            if seen.may_be_hidden(&polygon, away) {
+            if seen.meets(&polygon, away) {
                 seen.hide_but(&round.openings(x.as_dvec3()));
             }
         }
@@ -219,8 +218,8 @@ impl Seen {
         Self { sides: Sides::new(&sender, false), sender, pieces, hiding: Sides::default() }
     }
 
-    /// Whether a polygon, whose normal points away from the point or not, is before some of the sender: it is what hides it next.
-    fn may_be_hidden(&mut self, polygon: &[DVec3], away: bool) -> bool {
+    /// Whether a polygon, whose normal points away from the point or not, may hide some of the sender: then it is what hides it next.
+    fn meets(&mut self, polygon: &[DVec3], away: bool) -> bool {
         // What is beside all of the sender leaves its pieces whole, too.
         !self.sides.are_clear_of(polygon) && self.hiding.meet(polygon, away, &self.sender)
     }
@@ -240,14 +239,17 @@ impl Seen {
 /// About what a small polygon takes of what is seen from a point.
 fn solid_angle(polygon: &[DVec3], x: DVec3) -> f64 {
     let middle = polygon.iter().sum::<DVec3>() / polygon.len() as f64 - x;
-    let doubled: DVec3 = polygon.windows(2).skip(1).map(|p| (p[0] - polygon[0]).cross(p[1] - polygon[0])).sum();
-    doubled.dot(middle).abs() / middle.length().powi(3).max(f64::MIN_POSITIVE)
+    0.5 * doubled_area(polygon).dot(middle).abs() / middle.length().powi(3).max(f64::MIN_POSITIVE)
 }
 
 /// Unit normal of a polygon.
 fn normal(polygon: &[DVec3]) -> DVec3 {
-    let fan = polygon.windows(2).skip(1).map(|pair| (pair[0] - polygon[0]).cross(pair[1] - polygon[0]));
-    fan.sum::<DVec3>().normalize_or_zero()
+    doubled_area(polygon).normalize_or_zero()
+}
+
+/// Twice its area, along its normal.
+fn doubled_area(polygon: &[DVec3]) -> DVec3 {
+    polygon.windows(2).skip(1).map(|pair| (pair[0] - polygon[0]).cross(pair[1] - polygon[0])).sum()
 }
 
 #[cfg(test)]

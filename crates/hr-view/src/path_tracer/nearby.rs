@@ -236,11 +236,8 @@ impl Nearby {
             sender.is_some_and(|sender| visibility.geometries()[sender.surface as usize].is_polygon())
         };
         // Draws make noise where emitters are seen in part.
-        let noisy = |has: bool| {
-            let is_noisy = |at: &usize| self.seen[*at] < 1.0 && has_outline(self.entries[*at]) == has;
-            (0..shares.len()).filter(is_noisy).map(|at| shares[at]).sum::<f32>()
-        };
-        let [without, with] = [false, true].map(noisy);
+        let without = self.seen_in_part(&shares, |entry| !has_outline(entry));
+        let with = self.seen_in_part(&shares, has_outline);
         let mut left = MOST_OCCLUDERS[usize::from(with > without)];
         for entry in known.chain(others) {
             if left == 0 {
@@ -253,9 +250,7 @@ impl Nearby {
             }
         }
         self.outlined.sort_unstable_by_key(|(entry, _)| *entry);
-        let lacks = |at: usize| self.seen[at] < 1.0 && !self.is_outlined(self.entries[at]);
-        let lacking: f32 =
-            (0..shares.len()).filter(|&at| lacks(at) && has_outline(self.entries[at])).map(|at| shares[at]).sum();
+        let lacking = self.seen_in_part(&shares, |entry| has_outline(entry) && !self.is_outlined(entry));
         self.lacks_outlines = lacking >= MUCH && lacking > without;
         let is_drawn: Vec<bool> = self.entries.iter().map(|&entry| !self.is_outlined(entry)).collect();
         let mut sum = 0.0;
@@ -268,6 +263,12 @@ impl Nearby {
         }
         self.rest = sum;
         self
+    }
+
+    /// What the emitters among these bring that are seen in part, given the share of each.
+    fn seen_in_part(&self, shares: &[f32], is_among: impl Fn(u32) -> bool) -> f32 {
+        let is_counted = |at: &usize| self.seen[*at] < 1.0 && is_among(self.entries[*at]);
+        (0..shares.len()).filter(is_counted).map(|at| shares[at]).sum()
     }
 
     /// Whether all is known that may hide parts of an emitter.

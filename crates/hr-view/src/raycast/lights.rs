@@ -3,6 +3,7 @@
 
 use crate::path_tracer::Nearby;
 use glam::Vec2;
+use hr_diffuse::sampling::hash;
 use hr_diffuse::visibility::Patch;
 use hr_diffuse::{Domain, Geometry};
 use smallvec::SmallVec;
@@ -35,8 +36,8 @@ impl Lights {
         Self { nearby, are_even, parts: OnceLock::new() }
     }
 
-    /// What is known of the smallest part around a point that is worth it, where this many pixels would see each unit of area; `find` finds out what lights a
-    /// patch, from a seed.
+    /// What is known of the smallest part around a point that is worth it, where this many pixels would see each unit of area; `find` finds
+    /// out what lights a patch, from a seed.
     pub(super) fn around(
         &self,
         (geometry, mut place, uv): (&Geometry, Patch, Vec2),
@@ -55,7 +56,7 @@ impl Lights {
             });
             let at = geometry.locate(parts.iter().map(|part| part.domain), uv);
             place.domain = parts[at].domain;
-            seed = hr_diffuse::sampling::hash(seed, at as u32);
+            seed = hash(seed, at as u32);
             lights = parts[at].lights.get_or_init(|| Box::new(Self::new(find(&place, seed), false)));
         }
         lights

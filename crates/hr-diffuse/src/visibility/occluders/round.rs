@@ -1,6 +1,7 @@
 //! Outlines of spheres, cylinders and cones from a point: of the last two the lines that touch them are exact, circles are
 //! polygons of the same area.
 
+use super::doubled_area;
 use crate::geometry::{Profile, Revolution};
 use crate::visibility::pieces::Corners;
 use glam::{DVec2, DVec3};
@@ -149,7 +150,8 @@ impl Round {
         }
     }
 
-    /// Its outline as it is seen from a point outside, relative to that, in the place of another polygon. Tells whether its normal points away from there.
+    /// Its outline as it is seen from a point outside, relative to that, in the place of another polygon. Tells whether its normal points
+    /// away from there.
     pub(super) fn seen_from(&self, x: DVec3, outline: &mut Corners) -> bool {
         outline.clear();
         match *self {
@@ -192,7 +194,8 @@ impl Round {
         }
     }
 
-    /// The ends of a tube as they are seen from a point outside, relative to that, where one may see through both, each with whether its normal points away from there.
+    /// The ends of a tube as they are seen from a point outside, relative to that, where one may see through both; each with whether its
+    /// normal points away from there.
     pub(super) fn openings(&self, x: DVec3) -> Option<[(Corners, bool); 2]> {
         let Self::Tube { ends, radii } = *self else { return None };
         let Along { axis, length, height, aside } = Along::new(ends, x);
@@ -233,7 +236,6 @@ impl Along {
 }
 
 /// Whether the normal of a polygon points away from the zero point, given a direction toward its middle.
-fn points_away(polygon: &Corners, middle: DVec3) -> bool {
-    let area: DVec3 = (0..polygon.len()).map(|i| polygon[i].cross(polygon[(i + 1) % polygon.len()])).sum();
-    area.dot(middle) > 0.0
+fn points_away(polygon: &[DVec3], middle: DVec3) -> bool {
+    doubled_area(polygon).dot(middle) > 0.0
 }

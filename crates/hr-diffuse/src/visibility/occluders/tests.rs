@@ -209,14 +209,13 @@ fn round_bodies_hide_what_rays_find_hidden() {
 fn what_has_no_outline_or_too_much_is_left_to_rays() {
     let lamp = above([-0.5, 0.5], [-0.5, 0.5], 1.0);
     let ball = |z: f64| Surface::new(Shape::Sphere { center: dvec3(0.0, 0.0, z), radius: 0.2 }, 0);
-    let tube = |x: f64, radius: f64| {
-        let ends = [0.4, 0.6].map(|z| dvec3(x, 0.0, z));
-        Shape::Cone { ends, radii: [radius; 2] }
+    let tube = |heights: [f64; 2], radius: f64| {
+        let ends = heights.map(|z| dvec3(0.0, 0.0, z));
+        Surface::new(Shape::Cone { ends, radii: [radius; 2] }, 0)
     };
     let is_found = |other: Surface| between(&[ground(), lamp.clone(), other]).1.is_some();
-    let around = |radius: f64| Shape::Cone { ends: [-0.1, 0.6].map(|z| dvec3(0.0, 0.0, z)), radii: [radius; 2] };
-    assert!(!is_found(Surface::new(around(2.0), 0)), "around the ground");
-    assert!(is_found(Surface::new(tube(0.0, 0.2), 0)), "between");
+    assert!(!is_found(tube([-0.1, 0.6], 2.0)), "around the ground");
+    assert!(is_found(tube([0.4, 0.6], 0.2)), "between");
     assert!(!is_found(ball(1.0)), "half above the lamp");
     assert!(!is_found(ball(0.1)), "it holds some of the ground");
     let torus = Shape::Torus { center: dvec3(0.0, 0.0, 0.5), axis: dvec3(0.0, 0.0, 1.0), major: 0.2, minor: 0.05 };
