@@ -95,7 +95,7 @@ mod tests {
     /// All links of a room to parts of surfaces: at once, and point by point.
     #[test]
     fn what_arrives_all_over_arrives_at_each_point() {
-        let solver = solve(&room(), 0.1, (), Skips::ALL);
+        let solver = solve(&room(), 0.05, (), Skips::ALL);
         let light = solver.light();
         let (mut far, mut off, mut all) = (0, Vec2::ZERO, Vec2::ZERO);
         let to_patches = solver.links.all().iter().filter(|link| light.element(link.receiver).is_patch());

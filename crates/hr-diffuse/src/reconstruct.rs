@@ -635,7 +635,7 @@ mod tests {
                 materials: vec![material(Rgb::splat(0.5), Rgb::ZERO), material(Rgb::ZERO, Rgb::ONE)],
                 ..SceneInput::default()
             };
-            let mut solver = Solver::new(&input, Settings::with_error(0.1), ()).expect("a plate above a floor");
+            let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("a plate above a floor");
             solver.solve(&mut |_| ControlFlow::Continue(()));
             let solution = solver.finish(&mut |_| ControlFlow::Continue(()));
             let along = |v: f32| {

@@ -299,7 +299,7 @@ impl<L: LightField> Solver<L> {
         let mut senders = Senders::new((elements, &faces), &self.links, lit, |leaf| {
             faint[elements.nodes[leaf as usize].material as usize] == Rgb::ZERO
         });
-        let mut leaves = senders.leaves(elements, &faces, self.settings.error);
+        let mut leaves = senders.leaves(elements, &faces, self.settings.tolerance());
         if self.skips.negligible_detail {
             self.weigh(&senders, new.is_some(), &mut leaves);
         }
@@ -323,7 +323,7 @@ impl<L: LightField> Solver<L> {
         }
         if new.is_none() {
             // Light rises until it has settled: steps of all of the error would leave what is sent behind what arrives, bounce by bounce.
-            let step = STRENGTH_STEP * self.settings.error;
+            let step = STRENGTH_STEP * self.settings.tolerance();
             for Representative { leaf, strength, .. } in &mut senders.standing {
                 *strength = self.sent[*leaf as usize].follow(self.exitant.irradiance[*leaf as usize], step);
             }
@@ -372,7 +372,7 @@ impl<L: LightField> Solver<L> {
                 *most = most.max(PI * share * counts);
             }
         }
-        let error = DETAIL_SHARE * if is_new { NEW_SHARE } else { 1.0 } * self.link_error(self.settings.error);
+        let error = DETAIL_SHARE * if is_new { NEW_SHARE } else { 1.0 } * self.link_error(self.settings.tolerance());
         for Standing { leaf, negligible, .. } in leaves {
             *negligible = (error / by_leaf[*leaf as usize]).min(f32::MAX);
         }
@@ -411,7 +411,7 @@ impl<L: LightField> Solver<L> {
         if new.is_none() && matches!(how, Reflect::Not | Reflect::InProportion) {
             return Vec::new();
         }
-        let settled = SETTLED_SHARE * self.settings.error;
+        let settled = SETTLED_SHARE * self.settings.tolerance();
         let tolerance = match (new, how) {
             (Some(_), _) => self.negligibly_new(),
             (None, Reflect::Changed) => settled,

@@ -62,17 +62,18 @@ impl Unfinished {
         }
     }
 
-    /// The tolerance of the next pass toward a relative error; `None` where nothing is left to be done.
-    pub(crate) fn next(&self, error: f32) -> Option<f32> {
+    /// The tolerance of the next pass toward what is asked for; `None` where nothing is left to be done.
+    pub(crate) fn next(&self, settings: &Settings) -> Option<f32> {
+        let (error, aim) = (settings.error, settings.tolerance());
         if self.found.is_infinite() {
             // Links of the last of the first passes, or finer ones, are looked at once more.
-            let firsts = first_tolerances(error);
+            let firsts = first_tolerances(aim);
             let next = firsts.iter().find(|&&tolerance| tolerance < self.tolerance);
             return Some(next.copied().unwrap_or(self.tolerance));
         }
-        let in_vain = self.in_vain && self.tolerance < error;
-        let is_below = self.tolerance < FINEST * error;
-        let finest = if self.gained && (self.found > FAR * error || is_below) { 0.0 } else { FINEST * error };
+        let in_vain = self.in_vain && self.tolerance < aim;
+        let is_below = self.tolerance < FINEST * aim;
+        let finest = if self.gained && (self.found > FAR * error || is_below) { 0.0 } else { FINEST * aim };
         let done = self.found <= error || 0.5 * self.tolerance < finest || in_vain;
         // Whole halves, so that what rays happen to find seldom makes another solution.
         let halves = (2.0 * (self.found / error).log2()).round().clamp(1.0, MOST_HALVES);
@@ -146,10 +147,15 @@ mod tests {
     use super::*;
 
     /// Tolerances of the passes, where each of them finds what `found` says of its tolerance.
-    fn passes(error: f32, unfinished: &mut Unfinished, uncertain: f32, found: impl Fn(f32) -> f32) -> Vec<f32> {
+    fn passes(
+        settings: &Settings,
+        unfinished: &mut Unfinished,
+        uncertain: f32,
+        found: impl Fn(f32) -> f32,
+    ) -> Vec<f32> {
         let mut passes = Vec::new();
-        while let Some(tolerance) = unfinished.next(error) {
-            let (_, closely) = is_worth(tolerance, error);
+        while let Some(tolerance) = unfinished.next(settings) {
+            let (_, closely) = is_worth(tolerance, settings.tolerance());
             let found = Residual { absolute: found(tolerance), uncertain, ..Residual::default() };
             unfinished.done(tolerance, closely.then_some(&found));
             passes.push(tolerance);
@@ -159,25 +165,29 @@ mod tests {
 
     #[test]
     fn passes_end_where_finer_links_bring_nothing() {
-        let firsts = first_tolerances(0.05).to_vec();
+        let asked = Settings::with_error(0.05);
+        let firsts = first_tolerances(asked.tolerance()).to_vec();
         let mut fine = Unfinished::new(Vec::new());
-        assert_eq!(passes(0.05, &mut fine, 0.0, |_| 0.02), firsts, "it is fine already");
+        assert_eq!(passes(&asked, &mut fine, 0.0, |_| 0.02), firsts, "it is fine already");
         let mut shrinks = Unfinished::new(Vec::new());
-        let more = passes(0.05, &mut shrinks, 0.0, |tolerance| 0.3 * tolerance.sqrt());
+        let more = passes(&asked, &mut shrinks, 0.0, |tolerance| 0.3 * tolerance.sqrt());
         assert!(more.len() > firsts.len() && shrinks.found <= 0.05, "as long as it helps: {more:?}");
         let mut stays = Unfinished::new(Vec::new());
-        let once = passes(0.05, &mut stays, 0.0, |_| 0.06);
+        let once = passes(&asked, &mut stays, 0.0, |_| 0.06);
         assert_eq!(once.len(), firsts.len() + 1, "once to see, and no more: {once:?}");
-        assert_eq!(stays.next(0.05), None);
+        assert_eq!(stays.next(&asked), None);
         let mut unknown = Unfinished::new(Vec::new());
-        let tried = passes(0.05, &mut unknown, 0.3, |_| 0.06);
+        let tried = passes(&asked, &mut unknown, 0.3, |_| 0.06);
         assert!(tried.len() > once.len(), "what nobody knows does not end it: {tried:?}");
         let mut far = Unfinished::new(Vec::new());
-        let all = passes(0.05, &mut far, 0.0, |tolerance| 3.0 * tolerance.sqrt());
-        assert!(far.found <= 0.05 && far.tolerance < FINEST * 0.05, "far off, as long as it helps: {all:?}");
+        let all = passes(&asked, &mut far, 0.0, |tolerance| 3.0 * tolerance.sqrt());
+        assert!(
+            far.found <= 0.05 && far.tolerance < FINEST * asked.tolerance(),
+            "far off, as long as it helps: {all:?}"
+        );
         let mut stops = Unfinished::new(Vec::new());
-        let some = passes(0.05, &mut stops, 0.0, |tolerance| (3.0 * tolerance.sqrt()).max(0.2));
+        let some = passes(&asked, &mut stops, 0.0, |tolerance| (3.0 * tolerance.sqrt()).max(0.2));
         assert!(some.len() < all.len() && stops.found > 0.1, "and no longer: {some:?}");
-        assert!(stays.next(0.02).is_some(), "who asks for much less may have it tried");
+        assert!(stays.next(&Settings::with_error(0.02)).is_some(), "who asks for much less may have it tried");
     }
 }

@@ -186,12 +186,12 @@ impl<L: LightField> Solver<L> {
 
     /// Share of a node's light below which it need not be shot.
     pub(crate) fn negligibly_unshot(&self) -> f32 {
-        UNSHOT_SHARE * self.settings.error * self.lost()
+        UNSHOT_SHARE * self.settings.tolerance() * self.lost()
     }
 
     /// Share of a leaf's light below which what is new of it need not be reflected by the extension.
     pub(crate) fn negligibly_new(&self) -> f32 {
-        NEW_SHARE * self.settings.error * self.lost()
+        NEW_SHARE * self.settings.tolerance() * self.lost()
     }
 
     /// What is lost with each reflection, as a share: the reciprocal of what all reflections to come make of light.

@@ -64,7 +64,7 @@ impl<L: LightField> Solver<L> {
         let faces = self.face_clusters();
         self.stats.skipped.joined_leaves = faces.joined(&self.elements);
         let (links, nodes) = (self.links.all().len() as u64, self.elements.nodes.len() as u64);
-        let error = self.settings.error;
+        let error = self.settings.tolerance();
         let mut stopped = false;
         // A solution that was kept, and left as it was, knows it already.
         let known = self.gather.is_for(&self.links);

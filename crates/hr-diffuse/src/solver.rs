@@ -153,7 +153,7 @@ impl<L: LightField> Solver<L> {
         (field, incident, reflected): (L, Vec<L::Incident>, Vec<L::Exitant>),
         settings: Settings,
     ) -> Self {
-        let (faint, strong) = sorted(&field, &scene.materials, settings.error);
+        let (faint, strong) = sorted(&field, &scene.materials, settings.tolerance());
         let area = elements.nodes[0].area.max(f32::MIN_POSITIVE);
         let mut solver = Self {
             scene,
@@ -207,8 +207,8 @@ impl<L: LightField> Solver<L> {
             self.unfinished.renew(&mut self.links, self.elements.nodes.len());
         }
         let (mut is_left, mut goes_on) = (false, None);
-        while let Some(tolerance) = self.unfinished.next(self.settings.error) {
-            let (reflects, closely) = is_worth(tolerance, self.settings.error);
+        while let Some(tolerance) = self.unfinished.next(&self.settings) {
+            let (reflects, closely) = is_worth(tolerance, self.settings.tolerance());
             let pass = Pass { number: self.passes, tolerance, reflects, closely };
             self.refine(pass, &mut stopped, watch);
             if stopped {
@@ -217,7 +217,7 @@ impl<L: LightField> Solver<L> {
             }
             let late = self.stats.spent == Some(Spent::Time);
             // Once time is spent there is no later pass to look closely in.
-            let last = Pass { reflects: true, closely: true, tolerance: self.settings.error, ..pass };
+            let last = Pass { reflects: true, closely: true, tolerance: self.settings.tolerance(), ..pass };
             let pass = if late { last } else { pass };
             self.prepare_watched(pass, &mut stopped, watch);
             self.settle(pass, &mut stopped, watch);
@@ -238,7 +238,7 @@ impl<L: LightField> Solver<L> {
             self.passes += 1;
             // Where a budget is spent light settles first.
             if self.stats.spent.is_none() {
-                is_left = self.unfinished.next(self.settings.error).is_some();
+                is_left = self.unfinished.next(&self.settings).is_some();
                 break;
             }
         }
@@ -285,7 +285,7 @@ impl<L: LightField> Solver<L> {
         self.pull();
         let (mut stopped, tolerance) = (false, self.unfinished.tolerance);
         if tolerance.is_finite() {
-            let (reflects, _) = is_worth(tolerance, self.settings.error);
+            let (reflects, _) = is_worth(tolerance, self.settings.tolerance());
             let pass = Pass { number: 0, tolerance, reflects, closely: false };
             let kept = self.links.take();
             self.refine(pass, &mut stopped, watch);
@@ -308,7 +308,7 @@ impl<L: LightField> Solver<L> {
         let now = (&self.links, self.gather.arriving());
         let reshaped = known.map(|known| known.reshaped(&self.elements, now));
         for (node, sent) in self.sent.iter_mut().enumerate() {
-            if reshaped.as_ref().is_none_or(|share| share[node] > self.settings.error) {
+            if reshaped.as_ref().is_none_or(|share| share[node] > self.settings.tolerance()) {
                 sent.forget();
             }
         }
@@ -322,7 +322,7 @@ impl<L: LightField> Solver<L> {
 
     /// Tells materials whose extension's light travels as diffuse light from the others.
     pub(crate) fn sort_materials(&mut self) {
-        (self.faint, self.strong) = sorted(&self.field, &self.scene.materials, self.settings.error);
+        (self.faint, self.strong) = sorted(&self.field, &self.scene.materials, self.settings.tolerance());
     }
 
     /// Takes note of the memory in use.
@@ -342,9 +342,9 @@ impl<L: LightField> Solver<L> {
         }
         let tolerance = Tolerance {
             error: self.link_error(pass.tolerance),
-            lost: self.link_error(self.settings.error.min(pass.tolerance)),
+            lost: self.link_error(self.settings.tolerance().min(pass.tolerance)),
             shadow: if pass.closely || self.edges_known {
-                SHADOW_SHARE * self.settings.error * self.mean_irradiance()
+                SHADOW_SHARE * self.settings.tolerance() * self.mean_irradiance()
             } else {
                 f32::INFINITY
             },

@@ -120,7 +120,7 @@ mod tests {
     use glam::{DVec3, Vec3};
     use std::ops::ControlFlow;
 
-    const ERROR: f32 = 0.1;
+    const ERROR: f32 = 0.05;
     /// Parts of a side of the floor.
     const PARTS: u32 = 60;
     /// Where the wall stands.
@@ -174,7 +174,7 @@ mod tests {
         assert!(3 * with.1 < without.1, "{} rays, then {}", with.1, without.1);
         let total: f32 = without.0.iter().map(|(_, light, _)| light).sum();
         let apart: f32 = with.0.iter().zip(&without.0).map(|(a, b)| (a.1 - b.1).abs()).sum();
-        assert!(apart < 0.3 * ERROR * total, "{:.4} of the light", apart / total);
+        assert!(apart < 0.6 * ERROR * total, "{:.4} of the light", apart / total);
     }
 
     #[test]
@@ -186,12 +186,12 @@ mod tests {
             if x > 0.1 * part {
                 assert!(light < 0.02 * open, "{x} behind the wall: {light} of {open}");
             } else if x < -0.6 * part {
-                assert!((light / open - 1.0).abs() < 3.0 * ERROR, "{x} before the wall: {light} of {open}");
+                assert!((light / open - 1.0).abs() < 6.0 * ERROR, "{x} before the wall: {light} of {open}");
                 off += (light - open).abs();
                 all += open;
             }
         }
-        assert!(off < 0.3 * ERROR * all, "off by {:.4}", off / all);
+        assert!(off < 0.6 * ERROR * all, "off by {:.4}", off / all);
     }
 
     /// Cuts may leave a vertex without any leaf.

@@ -47,7 +47,7 @@ pub struct Args {
     pub mode: Option<Mode>,
 
     /// The accuracy asked for: relative error of the solution, 0.001 to 1
-    #[arg(long, value_name = "E", value_parser = error, default_value_t = 0.1, allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", value_parser = error, default_value_t = 0.05, allow_negative_numbers = true)]
     pub error: f32,
 
     /// How light travels between surfaces: gather, where all of it does in each iteration, or shoot, where only what is new does

@@ -85,7 +85,7 @@ impl<L: LightField> Solver<L> {
                 let kept = self.kept();
                 self.feedback.rein_in(&self.exitant.irradiance, kept);
             }
-            settled = self.remaining(residual) < share * self.settings.error && iteration > 0;
+            settled = self.remaining(residual) < share * self.settings.tolerance() && iteration > 0;
             if settled && !finely {
                 (settled, finely, next) = (false, true, Reflect::Changed);
             }

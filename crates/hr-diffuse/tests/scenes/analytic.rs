@@ -213,7 +213,7 @@ fn no_ray_contradicts_a_proof() {
         (DVec3::new(0.5, -0.4, -0.2), DVec3::new(0.3, 0.5, 0.2)),
         (DVec3::new(0.2, 0.6, 0.1), DVec3::new(0.02, 0.5, 0.9)),
     ];
-    let solution = solve(&room(&boxes), 0.05);
+    let solution = solve(&room(&boxes), 0.025);
     let (surfaces, visibility) = (solution.scene.surfaces(), &solution.scene.visibility);
     let (mut proved, mut contradicted) = (0, 0);
     for link in solution.links.all().iter().filter(|link| link.visibility < 0.0) {

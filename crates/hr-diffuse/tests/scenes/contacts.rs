@@ -54,7 +54,7 @@ fn share(solution: &Solution, at: DVec2) -> f64 {
 fn light_ends_where_surfaces_meet() {
     const PLACES: u32 = 400;
     for (shelf @ [a, b], most) in SHELVES.into_iter().zip([0, 32, 0]) {
-        let solution = solution(shelf, [0.0, DEPTH], 0.1);
+        let solution = solution(shelf, [0.0, DEPTH], 0.05);
         let up = (b - a).normalize().perp();
         let mut wrong = 0;
         for i in 0..PLACES {
@@ -76,7 +76,7 @@ fn shadows_end_at_lines() {
     const PLACES: u32 = 400;
     const NEAR: f64 = 0.1;
     const FAR: f64 = 0.15;
-    for (shelf, most) in SHELVES[..2].iter().zip([0, 16]) {
+    for (shelf, most) in SHELVES[..2].iter().zip([0, 20]) {
         let solution = solution(*shelf, [NEAR, FAR], 0.9);
         for (y, outward) in [(NEAR, 1.0), (FAR, -1.0)] {
             // Seen from the bulb, on the wall.
@@ -108,7 +108,7 @@ fn shadows_end_at_lines() {
 fn narrow_shadows_are_as_dark_as_they_are_wide() {
     const LOW: f64 = 0.3;
     let shelf @ [a, b] = SHELVES[0];
-    let solution = solution(shelf, [0.0, FRAME], 0.1);
+    let solution = solution(shelf, [0.0, FRAME], 0.05);
     let (mut off, mut all, mut shown, mut there) = (0.0, 0.0, 0.0, 0.0);
     for i in 0..200 {
         let on = a.lerp(b, 0.1 + 0.8 * f64::from(i) / 199.0);

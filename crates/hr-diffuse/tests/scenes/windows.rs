@@ -31,7 +31,7 @@ fn room(side: f64) -> Vec<Surface> {
 fn absorbed(surfaces: Vec<Surface>, lights: Vec<Light>) -> f64 {
     let wall = DiffuseMaterial { two_sided: false, ..paint(Rgb::splat(REFLECTANCE)) };
     let input = SceneInput { surfaces, materials: vec![wall, lamp(Rgb::ONE)], lights, ..SceneInput::default() };
-    let mut solver = Solver::new(&input, Settings::with_error(0.1), ()).expect("the room is sound");
+    let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
     let (elements, nodes) = (solver.elements(), &solver.elements().nodes);
     let of_room = |leaf: &u32| nodes[*leaf as usize].material == 0;

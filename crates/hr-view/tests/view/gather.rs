@@ -40,7 +40,7 @@ fn final_gathers_are_nearer_to_the_truth_than_their_solutions() {
         let rays = path_tracer::visibility(&scene).expect("sound");
         let right = PathTracer::new(&scene, &rays).render(&camera, 256, 1, &|_| ());
         let right = blocks(&right.image, &camera);
-        let settings = Settings::with_error(0.15);
+        let settings = Settings::with_error(0.07);
         let solved =
             Solved::new(Arc::clone(&scene), settings, false, &mut |_| ControlFlow::Continue(())).expect("solvable");
         let [gathered, reflected] = [Mode::Gather, Mode::Samples].map(|mode| {

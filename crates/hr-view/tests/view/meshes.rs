@@ -46,7 +46,7 @@ fn floor(parts: u32, reflector: impl Reflector + 'static) -> Arc<Scene> {
 
 fn solved(scene: &Arc<Scene>) -> Solved {
     let watch = &mut |_: &_| ControlFlow::Continue(());
-    Solved::new(Arc::clone(scene), Settings::with_error(0.1), true, watch).expect("a sound scene")
+    Solved::new(Arc::clone(scene), Settings::with_error(0.05), true, watch).expect("a sound scene")
 }
 
 fn camera(width: u32) -> Camera {
