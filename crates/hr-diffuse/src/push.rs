@@ -56,9 +56,12 @@ const LEAST_RAYS: f32 = 2.0;
 const MOST_RAYS: f32 = 16.0;
 /// Links none of whose segments was free let so much through, of which each leaf finds out what is true, …
 const LEAST_VISIBLE: f32 = 0.01;
-/// … and may let through so much, for all that a few segments tell: links are looked at closely as if they did. Were only those looked
-/// at of which something is seen, the light of the others would be missing, and nowhere be too much instead.
-const MAY_BE_VISIBLE: f32 = 0.1;
+/// … and where leaves look at links of their own, at least so much is what rays are shot for.
+const LEAST_WORTH: f32 = 0.1;
+/// Links are looked at closely as if they let so much through, if that is not proved, whatever their segments found. Were those looked
+/// at of which much is seen, and others not, what is seen of the former by chance would be corrected, and what is not seen of the latter be
+/// missing: through a blind there came a tenth too little.
+const MAY_BE_VISIBLE: f32 = 0.5;
 
 /// Bytes that are kept for each link, …
 pub(crate) const LINK_BYTES: usize = size_of::<Spread>() + size_of::<f32>();
@@ -382,11 +385,15 @@ fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -
         // Nothing is left to be found out, or nobody looks.
         (false, _) => f32::INFINITY,
     };
-    let may_be_visible =
-        if error.is_some() { visible(link, Spread::Exact).max(MAY_BE_VISIBLE) } else { link.visibility.abs() };
+    let may_be_visible = if error.is_some() { may_be_visible(link) } else { link.visibility.abs() };
     let irradiance = light.exitant.irradiance[link.receiver as usize].element_sum();
     let closely = mean > 0.0 && irradiance > 0.0 && mean * may_be_visible >= least * irradiance;
     (if closely { Spread::Exact } else { even }, mean)
+}
+
+/// What a link may let through, for all that is known without a look.
+fn may_be_visible(link: &Link) -> f32 {
+    if link.visibility < 0.0 { link.visibility.abs() } else { MAY_BE_VISIBLE }
 }
 
 /// How many numbers are kept of a weight of a place.
@@ -587,8 +594,7 @@ impl Place {
         // A place that is small or far is told apart by its orientation; so is one that gets next to nothing.
         let sender = light.element(link.sender);
         let far = self.spots(light).is_far(sender);
-        let may_be_visible = if link.visibility < 0.0 { visible } else { visible.max(MAY_BE_VISIBLE) };
-        if far && mean * may_be_visible * self.turned(light, link) < self.faint {
+        if far && mean * may_be_visible(link) * self.turned(light, link) < self.faint {
             let weight = Weight { unseen: link.visibility >= 0.0, ..self.plain(light, link) };
             return Found { weight, ..Found::default() };
         }
@@ -614,7 +620,7 @@ impl Place {
         if link.visibility < 0.0 {
             return Found { weight, view: view.map(|view| view * visible), rays: 0 };
         }
-        let worth = if shared { visible } else { visible.max(MAY_BE_VISIBLE) };
+        let worth = if shared { visible } else { visible.max(LEAST_WORTH) };
         let (seen, rays) = self.seen(light, link, here.value * worth, before);
         Found { weight: weight * (seen / visible), view: view.map(|view| view * seen), rays }
     }

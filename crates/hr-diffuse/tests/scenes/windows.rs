@@ -1,7 +1,7 @@
 //! Rooms that are lit through a small window and by nothing else: few rays find it.
 
 use crate::fixtures::{lamp, paint, quad};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use hr_diffuse::{DiffuseMaterial, Light, LightKind, Rgb, SceneInput, Settings, Solver, Surface};
 use std::ops::ControlFlow;
 
@@ -30,7 +30,8 @@ fn room(side: f64) -> Vec<Surface> {
 /// Power that the room's surfaces absorb: all that comes in by the window, but for the little that leaves by it.
 fn absorbed(surfaces: Vec<Surface>, lights: Vec<Light>) -> f64 {
     let wall = DiffuseMaterial { two_sided: false, ..paint(Rgb::splat(REFLECTANCE)) };
-    let input = SceneInput { surfaces, materials: vec![wall, lamp(Rgb::ONE)], lights, ..SceneInput::default() };
+    let materials = vec![wall, lamp(Rgb::ONE), paint(Rgb::ZERO)];
+    let input = SceneInput { surfaces, materials, lights, ..SceneInput::default() };
     let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
     let (elements, nodes) = (solver.elements(), &solver.elements().nodes);
@@ -89,4 +90,45 @@ fn a_sky_shines_in() {
         let irradiance = (0..n * n).map(part).sum::<f64>() * size.x * size.y / f64::from(n * n);
         assert_lit("a sky", side, absorbed(surfaces, Vec::new()), irradiance * side * side);
     }
+}
+
+/// A sky in front of the window, and black slats between. Of most pairs of a part of the room and one of the sky little is seen: were leaves to
+/// look for themselves where segments found that much is, and not where they found that nothing is, light would be lost.
+#[test]
+fn a_sky_shines_in_through_a_blind() {
+    const SLATS: u32 = 9;
+    let (side, low, size) = (1.0, DVec3::new(-1.0, -2.0, -1.0), DVec3::new(6.0, 0.0, 5.0));
+    let [left, sill] = CORNER;
+    // From the lower, inner edge of a slat to its upper, outer one: y and z.
+    let slat = |k: u32| {
+        let z = sill + side * f64::from(k) / f64::from(SLATS);
+        [DVec2::new(-0.01, z), DVec2::new(-0.06, z + 0.6 * side / f64::from(SLATS))]
+    };
+    let slats = (0..SLATS).map(slat).map(|[inner, outer]| {
+        let along = DVec3::new(0.0, outer.x - inner.x, outer.y - inner.y);
+        quad(DVec3::new(left - 1.0, inner.x, inner.y), DVec3::X * (side + 2.0), along, 2)
+    });
+    let mut surfaces = room(side);
+    surfaces.extend(slats);
+    surfaces.push(quad(low, DVec3::Z * size.z, DVec3::X * size.x, 1));
+    let is_free = |from: DVec2, to: DVec2| {
+        (0..SLATS).map(slat).all(|[a, b]| {
+            let (d, e) = (to - from, b - a);
+            let (t, u) = ((a - from).perp_dot(e) / d.perp_dot(e), (a - from).perp_dot(d) / d.perp_dot(e));
+            !((0.0..=1.0).contains(&t) && (0.0..=1.0).contains(&u))
+        })
+    };
+    let n = 400_000;
+    let pair = |i: u32| {
+        let u = hr_diffuse::sampling::point4(7, i).as_dvec4();
+        let sky = low + DVec3::new(size.x * u.x, 0.0, size.z * u.y);
+        let pane = DVec3::new(left + side * u.z, 0.0, sill + side * u.w);
+        let (away, flat) = (pane - sky, |at: DVec3| DVec2::new(at.y, at.z));
+        let seen = if is_free(flat(sky), flat(pane)) { 1.0 } else { 0.0 };
+        seen * away.y * away.y / (std::f64::consts::PI * away.length_squared().powi(2))
+    };
+    let comes_in = (0..n).map(pair).sum::<f64>() / f64::from(n) * size.x * size.z * side * side;
+    let share = absorbed(surfaces, Vec::new()) / comes_in;
+    // It was 0.95.
+    assert!((share - 1.0).abs() < 0.025, "{share} of what comes in");
 }
