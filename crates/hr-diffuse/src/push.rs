@@ -60,7 +60,7 @@ const LEAST_VISIBLE: f32 = 0.01;
 const LEAST_WORTH: f32 = 0.1;
 /// Links are looked at closely as if they let so much through, if that is not proved, whatever their segments found. Were those looked
 /// at of which much is seen, and others not, what is seen of the former by chance would be corrected, and what is not seen of the latter be
-/// missing: through a blind there came a tenth too little.
+/// missing: through a blind there came a twentieth too little.
 const MAY_BE_VISIBLE: f32 = 0.5;
 
 /// Bytes that are kept for each link, …

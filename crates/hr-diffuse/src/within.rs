@@ -174,6 +174,7 @@ mod tests {
         assert!(3 * with.1 < without.1, "{} rays, then {}", with.1, without.1);
         let total: f32 = without.0.iter().map(|(_, light, _)| light).sum();
         let apart: f32 = with.0.iter().zip(&without.0).map(|(a, b)| (a.1 - b.1).abs()).sum();
+        // What is asked of links is twice the error: as their errors cancel.
         assert!(apart < 0.6 * ERROR * total, "{:.4} of the light", apart / total);
     }
 
