@@ -97,7 +97,7 @@ pub(crate) fn residual<L: LightField>(
         let element = light.element(leaf);
         // Of covered parts the solution says nothing.
         let counts = element.importance > 0.0 && light.elements.exposed(leaf) >= 1.0;
-        if counts { f64::from(element.area * element.importance) } else { 0.0 }
+        if counts { f64::from(element.area * element.importance * light.counted(leaf)) } else { 0.0 }
     };
     let irradiance = |leaf: u32| f64::from(light.exitant.irradiance[leaf as usize].element_sum());
     let (mut area, mut power) = (0.0, 0.0);

@@ -452,13 +452,14 @@ impl<L: LightField> Solver<L> {
         self.light().weight(receiver)
     }
 
-    /// Mean irradiance of the surfaces that any light reaches and that reflect any; before there is any, that which the emitted power
-    /// would make if it were spread evenly. The measure of every tolerance.
+    /// Mean irradiance of the surfaces that any light reaches and that reflect any, as far as it [counts](Light::counted); before there
+    /// is any, that which the emitted power would make if it were spread evenly. The measure of every tolerance.
     pub(crate) fn mean_irradiance(&self) -> f32 {
+        let light = self.light();
         let (mut lit, mut area, mut power) = (0.0_f64, 0.0_f64, 0.0_f64);
         for leaf in self.elements.patch_leaves() {
-            let (element, leaf) = (&self.elements.nodes[leaf as usize], leaf as usize);
-            let irradiance = self.exitant.irradiance[leaf].max_element();
+            let (element, counted, leaf) = (&self.elements.nodes[leaf as usize], light.counted(leaf), leaf as usize);
+            let irradiance = self.exitant.irradiance[leaf].max_element() * counted;
             if irradiance > 0.0 && element.importance > 0.0 {
                 lit += f64::from(irradiance * element.area);
                 area += f64::from(element.area);

@@ -51,7 +51,8 @@ pub struct Exitant {
     pub gain: Vec<f32>,
     /// Most radiance (max channel, any direction) of the leaves that stand for a node.
     pub peak: Vec<f32>,
-    /// How much more errors count than where it is bright, ≥ 1: see [adaptation](crate::adaptation).
+    /// How much more errors count than where it is bright, or how much less where it is bright in vain: see
+    /// [adaptation](crate::adaptation).
     pub(crate) adaptation: Vec<f32>,
     /// Where clusters are no good as wholes.
     pub(crate) misjudged: Misjudged,
@@ -95,6 +96,11 @@ impl<L: LightField> Light<'_, L> {
         let element = self.element(receiver);
         let share = (element.area / self.elements.measure()).sqrt();
         element.importance * share * self.exitant.adaptation[receiver as usize]
+    }
+
+    /// The share of a leaf's irradiance that counts in the light that there is.
+    pub(crate) fn counted(&self, leaf: u32) -> f32 {
+        self.exitant.adaptation[leaf as usize].min(1.0)
     }
 
     /// What a sender emits in a direction away from it, in the units that [`Link::factor`](crate::links::Link)

@@ -859,8 +859,8 @@ mod tests {
         }
         let [along, leaves, samples] = light;
         let off = [leaves, samples].map(|sum| (sum / along - 1.0).abs());
-        // Both are off by 10 to 13 % at errors of 0.045 to 0.08, leaves by a tenth of that more: which is nearer hangs on the error.
-        assert!(count > 300 && off[0] < 0.12 && off[0] < 1.1 * off[1], "of {count} points: {off:?}");
+        // Both are off by 10 to 13 % at errors of 0.045 to 0.08, leaves by up to a sixth of that more: which is nearer hangs on the error.
+        assert!(count > 300 && off[0] < 0.12 && off[0] < 1.2 * off[1], "of {count} points: {off:?}");
         let known = caster.spared().known_ends;
         assert!(known > 1000, "{known}");
     }

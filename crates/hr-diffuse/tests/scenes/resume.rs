@@ -91,7 +91,8 @@ fn spent_budgets_are_no_end() {
     assert!(poor.stats.spent.is_some() && poor.links.all().len() < whole.links.all().len() / 2, "it was spent");
     let rich = go_on(poor, ERROR);
     let off = difference(&rich, &whole);
-    assert!(rich.stats.spent.is_none() && off < 0.5 * ERROR, "off by {off}");
+    // Each is off by what was asked for at most, as rays have found: two may be as far apart.
+    assert!(rich.stats.spent.is_none() && off < ERROR, "off by {off}");
 }
 
 #[test]

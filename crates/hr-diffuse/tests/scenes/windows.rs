@@ -2,6 +2,7 @@
 
 use crate::fixtures::{lamp, paint, quad};
 use glam::{DVec2, DVec3, Vec3};
+use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::{DiffuseMaterial, Light, LightKind, Rgb, SceneInput, Settings, Solver, Surface};
 use std::ops::ControlFlow;
 
@@ -131,4 +132,23 @@ fn a_sky_shines_in_through_a_blind() {
     let share = absorbed(surfaces, Vec::new()) / comes_in;
     // It was 0.95.
     assert!((share - 1.0).abs() < 0.025, "{share} of what comes in");
+}
+
+/// The sky lights the outer sides of walls by tens of times what comes in. Nothing else is lit by them, so that they do not tell how finely
+/// the room is to be solved.
+#[test]
+fn outer_walls_shine_in_vain() {
+    let leaves_within = |two_sided| {
+        let mut surfaces = room(0.5);
+        surfaces.push(quad(DVec3::new(-1.0, -2.0, -1.0), DVec3::Z * 5.0, DVec3::X * 6.0, 1));
+        let wall = DiffuseMaterial { two_sided, ..paint(Rgb::splat(REFLECTANCE)) };
+        let input = SceneInput { surfaces, materials: vec![wall, lamp(Rgb::ONE)], ..SceneInput::default() };
+        let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        let nodes = &solver.elements().nodes;
+        solver.elements().patch_leaves().filter(|&leaf| nodes[leaf as usize].kind == Kind::Front).count()
+    };
+    let [alone, outer_walls] = [false, true].map(leaves_within);
+    // There was a seventh when they told.
+    assert!(10 * outer_walls > 7 * alone, "{alone} leaves, {outer_walls} where outer walls reflect");
 }
