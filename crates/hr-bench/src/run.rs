@@ -10,7 +10,6 @@ use crate::{
 use hr_scene::{Camera, ImageKind, Scene, ToneMap, builtin};
 use hr_view::path_tracer::{self, PathTracer};
 use std::io::Write;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -47,18 +46,9 @@ pub(crate) fn say(out: Out<'_>, line: &str) -> Result<(), BenchError> {
     writeln!(out, "{line}").and_then(|()| out.flush()).map_err(BenchError::Output)
 }
 
-/// The scene's camera of that name, or that in a file; the first one, or one made for the scene, without a name.
+/// The camera [of that name](Scene::camera_named); the first one, or one made for the scene, without a name.
 pub(crate) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera, BenchError> {
-    let Some(name) = name else { return Ok(scene.default_camera()) };
-    if let Some((_, camera)) = scene.cameras.iter().find(|(known, _)| known == name) {
-        return Ok(*camera);
-    }
-    if Path::new(name).extension().is_some() {
-        return Ok(Camera::load(Path::new(name))?);
-    }
-    let known: Vec<&str> = scene.cameras.iter().map(|(known, _)| known.as_str()).collect();
-    let text = format!("'{name}' is no camera of {}; it has {}, or give a .json file", scene.name, known.join(", "));
-    Err(BenchError::Arguments(text))
+    Ok(name.map_or_else(|| Ok(scene.default_camera()), |name| scene.camera_named(name))?)
 }
 
 fn reference(args: &ReferenceArgs, out: Out<'_>) -> Result<(), BenchError> {

@@ -29,6 +29,13 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// Whether this stands for a file rather than for the name of a [scene's camera](crate::Scene::camera_named): there is one, or it ends in
+    /// `.json`.
+    #[must_use]
+    pub fn is_file(name: &Path) -> bool {
+        name.is_file() || name.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
+    }
+
     /// Reads a camera from a JSON file and [checks](Self::check) it.
     ///
     /// # Errors

@@ -41,6 +41,16 @@ pub enum SceneError {
         /// The names of the built-in scenes.
         known: String,
     },
+    /// Neither the scene nor a file has this camera.
+    #[error("'{name}' is neither a camera of {scene} nor a file; the scene has {known}; give a .json file for others")]
+    NoCamera {
+        /// What was asked for.
+        name: String,
+        /// The scene's name.
+        scene: String,
+        /// The names of its cameras, or "none".
+        known: String,
+    },
     /// No surface has a material of this name.
     #[error("no surface has a material '{name}'; materials: {known}")]
     NoMaterial {

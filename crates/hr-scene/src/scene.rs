@@ -92,6 +92,22 @@ impl Scene {
         scene.finish()
     }
 
+    /// The camera that a command line asks for: the scene's one of this name, or that in a [file](Camera::is_file).
+    ///
+    /// # Errors
+    /// [`SceneError::NoCamera`] where it is neither, those of [`Camera::load`] where the file is no camera.
+    pub fn camera_named(&self, name: &str) -> Result<Camera, SceneError> {
+        if let Some((_, camera)) = self.cameras.iter().find(|(known, _)| known == name) {
+            return Ok(*camera);
+        }
+        if Camera::is_file(Path::new(name)) {
+            return Camera::load(Path::new(name));
+        }
+        let known: Vec<&str> = self.cameras.iter().map(|(known, _)| known.as_str()).collect();
+        let known = if known.is_empty() { "none".to_owned() } else { listed(known) };
+        Err(SceneError::NoCamera { name: name.to_owned(), scene: self.name.clone(), known })
+    }
+
     /// Leaves out the surfaces of all materials of this name, as if they were not there: the panes of windows, for light to come in, or what
     /// only stands for something that is cut out of it.
     ///
@@ -105,11 +121,7 @@ impl Scene {
                 self.surfaces.iter().map(|s| self.materials[s.material as usize].name.as_str()).collect();
             known.sort_unstable();
             known.dedup();
-            let more = known.len().saturating_sub(MOST_NAMES);
-            known.truncate(MOST_NAMES);
-            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            let known = format!("'{}'{more}", known.join("', '"));
-            return Err(SceneError::NoMaterial { name: material.to_owned(), known });
+            return Err(SceneError::NoMaterial { name: material.to_owned(), known: listed(known) });
         }
         if stays.iter().all(|stays| !*stays) {
             return Err(SceneError::empty(format!("{} without '{material}'", self.name), &self.warnings));
@@ -163,6 +175,14 @@ impl Scene {
     }
 }
 
+/// Names in quotes, and how many more there are than one reads.
+fn listed(mut names: Vec<&str>) -> String {
+    let more = names.len().saturating_sub(MOST_NAMES);
+    names.truncate(MOST_NAMES);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("'{}'{more}", names.join("', '"))
+}
+
 impl SurfaceReflectance for Scene {
     fn mean(&self, surface: u32, corners: &[Vec2]) -> Option<Rgb> {
         self.mean_base_color(surface, corners).map(|color| self.diffuse_of(surface, color))
@@ -194,6 +214,32 @@ mod tests {
             error.contains(&gone) && error.contains(&scene.materials[scene.surfaces[0].material as usize].name),
             "{error}"
         );
+    }
+
+    #[test]
+    fn cameras_have_names_or_are_in_files() {
+        let mut scene = Scene::load("room").expect("built in");
+        let (name, camera) = scene.cameras[1].clone();
+        assert_eq!(scene.camera_named(&name).expect("a name"), camera, "{name}");
+        let folder = crate::testing::Folder::new("cameras");
+        // A name that ends in something is a file where there is one.
+        for name in ["camera.JSON", "camera.001"] {
+            let path = folder.path(name);
+            let text = serde_json::to_string(&camera).expect("plain numbers");
+            std::fs::write(&path, text).expect("a file");
+            assert_eq!(scene.camera_named(&path.display().to_string()).expect("a file"), camera, "{name}");
+        }
+        scene.cameras[1].0 = "Camera.001".into();
+        assert_eq!(scene.camera_named("Camera.001").expect("names have dots, too"), camera);
+        let missing = scene.camera_named("missing.json").expect_err("no file");
+        assert!(matches!(missing, SceneError::Io { .. }), "{missing}");
+        let unknown = scene.camera_named("Camera.002").expect_err("no name");
+        assert!(matches!(unknown, SceneError::NoCamera { .. }), "{unknown}");
+        let text = unknown.to_string();
+        assert!(["'Camera.002'", "room", "'main', 'Camera.001'"].iter().all(|part| text.contains(part)), "{text}");
+        scene.cameras.clear();
+        let none = scene.camera_named("main").expect_err("there are none").to_string();
+        assert!(none.contains("has none") && none.contains(".json"), "{none}");
     }
 
     #[test]

@@ -8,8 +8,7 @@ use hr_diffuse::Transport;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-const CAMERA_HELP: &str =
-    r#"Where to look from: {"eye":[x,y,z],"target":[x,y,z],"up":[x,y,z],"fov_x":degrees,"width":w,"height":h}"#;
+const CAMERA_HELP: &str = r#"Where to look from: the name of one of the scene's cameras, or a file, {"eye":[x,y,z],"target":[x,y,z],"up":[x,y,z],"fov_x":degrees,"width":w,"height":h}"#;
 
 /// Walk through the global illumination of a scene, glossy reflection included.
 ///
@@ -22,8 +21,8 @@ pub struct Args {
     #[arg(value_name = "SCENE", default_value = hr_scene::builtin::DEFAULT)]
     pub scene: String,
 
-    /// Where to look from: a file with the JSON form of a [`Camera`](hr_scene::Camera)
-    #[arg(long, value_name = "FILE.json", help = CAMERA_HELP)]
+    /// Where to look from: the name of one of the scene's cameras, or a file with the JSON form of a [`Camera`](hr_scene::Camera)
+    #[arg(long, value_name = "FILE.json|NAME", help = CAMERA_HELP)]
     pub camera: Option<PathBuf>,
 
     /// Leave out all surfaces of a material, as if they were not there, such as the glass of windows; more than once for several

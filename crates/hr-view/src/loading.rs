@@ -12,8 +12,8 @@ const MOST_WARNINGS: usize = 8;
 /// The scene, with the camera of the command line first.
 pub(crate) fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewError> {
     progress.at(&format!("loading {}", args.scene), 0.0);
-    // The camera first: it is read at once, and a mistake in it shows before the wait for a large scene.
-    let camera = args.camera.as_deref().map(Camera::load).transpose()?;
+    // A camera's file first: it is read at once, and a mistake in it shows before the wait for a large scene.
+    let in_file = args.camera.as_deref().filter(|name| Camera::is_file(name)).map(Camera::load).transpose()?;
     let mut scene = Scene::load(&args.scene)?;
     for warning in scene.warnings.iter().take(MOST_WARNINGS) {
         let times = if warning.count > 1 { format!(", {} times", warning.count) } else { String::new() };
@@ -31,8 +31,13 @@ pub(crate) fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewE
              KHR_lights_punctual",
         );
     }
-    if let Some(camera) = camera {
+    if let Some(camera) = in_file {
         scene.cameras.insert(0, ("--camera".to_owned(), camera));
+    } else if let Some(name) = &args.camera {
+        let name = name.to_string_lossy().into_owned();
+        let camera = scene.camera_named(&name)?;
+        scene.cameras.retain(|(known, _)| *known != name);
+        scene.cameras.insert(0, (name, camera));
     } else if scene.cameras.is_empty() {
         scene.cameras.push(("default".to_owned(), scene.default_camera()));
     }

@@ -20,10 +20,11 @@ fn command(arguments: &[&str]) -> Command {
 
 #[test]
 fn mistakes_are_status_1_and_one_line() {
-    let cases: [(&[&str], &str); 13] = [
+    let cases: [(&[&str], &str); 14] = [
         (&["no-such-scene"], "room"),
         (&["no-such-file.mgf"], "no-such-file.mgf"),
         (&["--camera", "no-such-camera.json"], "no-such-camera.json"),
+        (&["room", "--camera", "no-such-camera"], "'dining'"),
         (&["--image", "picture.gif"], ".png"),
         (&["--error", "2"], "0.001"),
         (&["furnace", "--html", "no/such/folder/a.html"], "no/such/folder/a.html"),
@@ -93,6 +94,18 @@ fn scenes_of_which_nothing_is_left_say_why() {
         assert_eq!(output.status.code(), Some(1), "{text}");
         assert!(text.lines().count() == 1 && text.contains(hint) && text.contains(":4"), "{face} says: {text}");
     }
+}
+
+#[test]
+fn the_scenes_cameras_go_by_their_names() {
+    let folder = Folder::new("cameras");
+    let image = folder.path("a.pfm");
+    let sizes = ["standard", "high"].map(|name| {
+        succeeds(&["cornell", "--error", "0.9", "--camera", name, "--image", &image]);
+        let picture = std::fs::read(&image).expect("a picture");
+        String::from_utf8_lossy(&picture[..20]).lines().nth(1).map(str::to_owned)
+    });
+    assert_eq!(sizes, ["300 300", "400 300"].map(|size| Some(size.to_owned())), "each has its own size");
 }
 
 #[test]
