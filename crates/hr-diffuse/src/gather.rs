@@ -347,6 +347,11 @@ impl Gather {
         self.push.faint_links
     }
 
+    /// Looks at links from places that were spared, as others were drawn by chance.
+    pub(crate) fn spared_looks(&self) -> u64 {
+        self.push.spared_looks
+    }
+
     /// Where light arrives.
     pub(crate) fn places(&self) -> &Places {
         &self.push.places

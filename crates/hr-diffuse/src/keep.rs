@@ -431,7 +431,7 @@ impl Vertices {
 }
 
 /// Counters of [`Stats`].
-const COUNTERS: usize = 26;
+const COUNTERS: usize = 27;
 
 impl Stats {
     /// All counters, in the order in which they are kept.
@@ -470,6 +470,7 @@ impl Stats {
             converged_leaves,
             steady_senders,
             faint_links,
+            spared_looks,
             inner_vertices,
             // Of the pictures that were taken, not of the solution.
             unseen_vertices: _,
@@ -501,6 +502,7 @@ impl Stats {
             converged_leaves,
             steady_senders,
             faint_links,
+            spared_looks,
             inner_vertices,
             joined_leaves,
             shot_links,

@@ -15,7 +15,7 @@ use crate::inherited::{Above, Carried, inherit};
 use crate::kept_weights::{KeptWeights, UNEVEN_SHARE};
 use crate::links::{Link, Links};
 use crate::places::{Edges, Places};
-use crate::sampling::hash;
+use crate::sampling::{hash, unit};
 use crate::segments::{receiving_point, visibility};
 use crate::threads;
 use crate::transport::{Light, negligible};
@@ -42,6 +42,13 @@ const LEAST_SPREAD: f32 = 0.01;
 /// Irradiance × importance × √(share of all area) that a place of many leaves may be off its mean by for the edge of a shadow, as a
 /// share of the error times the mean irradiance.
 const EDGE_SHARE: f32 = 0.008;
+/// Links that let less through than this, as far as their segments tell, …
+const HARDLY_VISIBLE: f32 = 0.2;
+/// … are looked at by chance where they bring less than this share of a leaf's light, times the square root of the tolerance: the likelier
+/// the more they bring, …
+const SURE_SHARE: f32 = 0.07;
+/// … and at least so likely. Fewer would save little: what is left is spent on what is seen.
+const LEAST_CHANCE: f32 = 0.1;
 /// So many points of a place of many leaves.
 const CLUSTER_POINTS: u32 = 8;
 /// Leaves get no more than this times what a link brings on average. Surfaces that lie in one another's plane hide each
@@ -93,6 +100,8 @@ pub(crate) struct Push {
     means: Vec<f32>,
     /// Links that would be looked at closely if they brought more.
     pub(crate) faint_links: u64,
+    /// Looks at links that were left to chance, and not drawn.
+    pub(crate) spared_looks: u64,
     /// Rays shot for places and weights.
     pub(crate) rays: u64,
     /// By place that has weights: how much more of its view is taken up than links and weights tell. Of the dark part of a bright sender,
@@ -128,6 +137,7 @@ impl Push {
             error: error.unwrap_or_default(),
             means,
             faint_links: 0,
+            spared_looks: 0,
             rays: 0,
             dim_views: Vec::new(),
             first: vec![0],
@@ -161,7 +171,7 @@ impl Push {
         let mut weights = vec![0.0; push.first[push.first.len() - 1]];
         let mut parts = by_place(&mut weights, &push.first, &push.places.nodes);
         let chunk = if error.is_some() { BETWEEN_WATCHES * threads::current_num_threads() } else { parts.len().max(1) };
-        let mut rays = found_by;
+        push.rays = found_by;
         let look = match known {
             Some(known) => Look::Beyond(known),
             None if error.is_none() => Look::Roughly,
@@ -171,28 +181,27 @@ impl Push {
             if error.is_some() && watch().is_break() {
                 return Self::new(light, links, None, (room, None), watch);
             }
-            for (dim_view, shot) in threads::map_mut(part, 4, |_, part| push.find(light, links, part, look)) {
-                push.dim_views.push(dim_view);
-                rays += u64::from(shot);
+            for looked in threads::map_mut(part, 4, |_, part| push.find(light, links, part, look)) {
+                push.dim_views.push(looked.dim_view);
+                push.spared_looks += u64::from(looked.spared);
+                push.rays += u64::from(looked.rays);
             }
         }
-        push.rays = rays;
         push.weights = weights;
         push
     }
 
-    /// Finds the weights of a place. Returns how much more of its view is taken up than they tell, and the number of rays that it took.
+    /// Finds the weights of a place.
     fn find<L: LightField>(
         &self,
         light: Light<'_, L>,
         links: &Links,
         (node, weights): &mut (u32, &mut [f32]),
         look: Look<'_>,
-    ) -> (f32, u32) {
-        let (mut slots, mut rays) = (weights.chunks_exact_mut(numbers(light, *node)), 0);
+    ) -> Looked {
+        let (mut slots, mut looked) = (weights.chunks_exact_mut(numbers(light, *node)), Looked::default());
         let mut known = if let Look::Beyond(known) = look { Some(known.of(light.elements, *node)) } else { None };
         let before = known.as_ref().and_then(|known| known.dim_view);
-        let mut dim_view = 0.0;
         self.each(light, *node, |place, at| {
             let Some(slot) = slots.next() else { return };
             let link = &links.all()[at];
@@ -200,7 +209,7 @@ impl Push {
             let find = || match look {
                 Look::Roughly => plain(),
                 Look::Beyond(known) if known.rough => plain(),
-                _ => place.weight(light, link, self.means[at], rays),
+                _ => place.weight(light, link, self.means[at], looked.rays),
             };
             let brings = self.means[at] * visible(link, Spread::Exact);
             let known = known.as_mut().and_then(|known| known.take(light, link, (brings, place.uneven)));
@@ -209,12 +218,16 @@ impl Push {
                 found.weight = Weight::of(slot);
             }
             found.weight.keep(slot);
-            rays += found.rays;
+            looked.rays += found.rays;
+            looked.spared += u32::from(found.spared);
             if let Some(view) = found.view.filter(|_| Group::of(light, link.sender) == Group::Rest) {
-                dim_view += view - found.weight.value * share(light, link, Spread::Exact);
+                looked.dim_view += view - found.weight.value * share(light, link, Spread::Exact);
             }
         });
-        (before.unwrap_or(if dim_view > LEAST_DIM_VIEW { dim_view } else { 0.0 }), rays)
+        if looked.dim_view <= LEAST_DIM_VIEW {
+            looked.dim_view = 0.0;
+        }
+        Looked { dim_view: before.unwrap_or(looked.dim_view), ..looked }
     }
 
     /// Places have the ids that they have after [`Elements::graft`].
@@ -471,6 +484,19 @@ struct Found {
     view: Option<f32>,
     /// Rays that were shot.
     rays: u32,
+    /// Whether it was left to chance to look, which did not draw it.
+    spared: bool,
+}
+
+/// What a place found out about all of them.
+#[derive(Clone, Copy, Default)]
+struct Looked {
+    /// How much more of its view is taken up than its weights tell.
+    dim_view: f32,
+    /// Rays that it took.
+    rays: u32,
+    /// Links that it did not look at, as others were drawn by chance.
+    spared: u32,
 }
 
 /// A place, and the points that stand for it.
@@ -486,8 +512,10 @@ struct Place {
     negligible: f32,
     /// … links that bring less are not looked at closely (sum of channels), …
     faint: f32,
-    /// … and no weights are found anew for less (sum of channels).
+    /// … no weights are found anew for less (sum of channels), …
     uneven: f32,
+    /// … and more is looked at whatever links let through (sum of channels).
+    sure: f32,
 }
 
 impl Place {
@@ -502,6 +530,7 @@ impl Place {
             negligible: negligible(irradiance, error),
             faint: FAINT_SHARE * error.sqrt() * irradiance.element_sum(),
             uneven: UNEVEN_SHARE * error * irradiance.element_sum(),
+            sure: SURE_SHARE * error.sqrt() * irradiance.element_sum(),
         }
     }
 
@@ -599,6 +628,10 @@ impl Place {
             return Found { weight, ..Found::default() };
         }
         let shared = is_shared(light, link.receiver);
+        let chance = if shared { self.chance(light, link, mean) } else { 1.0 };
+        if unit(hash(hash(self.node, 0x20e1), link.sender)) >= chance {
+            return Found { spared: true, ..Found::default() };
+        }
         let (here, view) = if !shared {
             (Weight { value: mean, ..Weight::default() }, None)
         } else if !far && (!element.is_patch() || mean * visible > self.much) {
@@ -618,11 +651,23 @@ impl Place {
         }
         let weight = here * ((here.value / mean).min(MOST_WEIGHT) / here.value);
         if link.visibility < 0.0 {
-            return Found { weight, view: view.map(|view| view * visible), rays: 0 };
+            return Found { weight, view: view.map(|view| view * visible), ..Found::default() };
         }
         let worth = if shared { visible } else { visible.max(LEAST_WORTH) };
         let (seen, rays) = self.seen(light, link, here.value * worth, before);
-        Found { weight: weight * (seen / visible), view: view.map(|view| view * seen), rays }
+        let seen = seen / chance;
+        Found { weight: weight * (seen / visible), view: view.map(|view| view * seen), rays, ..Found::default() }
+    }
+
+    /// How likely a link is looked at that is for more than this place: what is seen then counts so many times as much (J. Arvo and
+    /// D. Kirk, "Particle transport and image synthesis", SIGGRAPH 1990), so that the mean of all places is what it was. In a
+    /// heap nearly all that a place could see lies behind what is near; a look at each of it found that nearly always.
+    fn chance<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32) -> f32 {
+        if link.visibility < 0.0 || link.visibility >= HARDLY_VISIBLE {
+            return 1.0;
+        }
+        let share = mean * self.turned(light, link) / self.sure;
+        if share < 1.0 { share.max(LEAST_CHANCE) } else { 1.0 }
     }
 
     /// Share of a link's sender that the place sees, by as many rays as what it `brings` is worth, and their number. The rays of all

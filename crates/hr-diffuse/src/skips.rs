@@ -15,7 +15,7 @@ pub(crate) struct Skips {
     pub(crate) converged_leaves: bool,
     /// Links over which a sender sends the same directional light as before, or so many times as much.
     pub(crate) steady_senders: bool,
-    /// A look from each leaf at links that bring next to nothing.
+    /// A look from each leaf at links that bring next to nothing, or by chance at those that hardly let anything through.
     pub(crate) faint_links: bool,
     /// Values at vertices within places of many leaves.
     pub(crate) inner_vertices: bool,

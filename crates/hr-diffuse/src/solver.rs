@@ -439,6 +439,7 @@ impl<L: LightField> Solver<L> {
         self.prepared = tolerance.is_some();
         self.stats.rays += self.gather.rays();
         self.stats.skipped.faint_links = self.gather.faint_links();
+        self.stats.skipped.spared_looks += self.gather.spared_looks();
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 

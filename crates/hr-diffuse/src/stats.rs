@@ -77,6 +77,8 @@ pub struct Skipped {
     pub steady_senders: u64,
     /// Links that bring so little that leaves do not look for themselves what they bring there.
     pub faint_links: u64,
+    /// Looks from leaves at links that hardly let anything through, left to those that were drawn by chance.
+    pub spared_looks: u64,
     /// Vertices that gather nothing, as they lie within a place of many leaves that gathered for them.
     pub inner_vertices: u64,
     /// Vertices that gather nothing, as pictures do not show them.
@@ -100,6 +102,7 @@ impl std::ops::AddAssign for Skipped {
         self.converged_leaves += other.converged_leaves;
         self.steady_senders += other.steady_senders;
         self.faint_links += other.faint_links;
+        self.spared_looks += other.spared_looks;
         self.inner_vertices += other.inner_vertices;
         self.unseen_vertices += other.unseen_vertices;
         self.unseen_leaves += other.unseen_leaves;

@@ -72,9 +72,9 @@ impl Push {
                 break;
             }
             let found = threads::map_mut(part, 4, |_, (_, part)| self.find(light, links, part, Look::Again));
-            for ((index, _), (dim_view, shot)) in part.iter().zip(found) {
-                dim_views[*index] = dim_view;
-                rays += u64::from(shot);
+            for ((index, _), looked) in part.iter().zip(found) {
+                dim_views[*index] = looked.dim_view;
+                rays += u64::from(looked.rays);
                 renewed += 1;
             }
         }

@@ -1,9 +1,11 @@
-use super::{FAINT_SHARE, LEAST_VISIBLE, Push, Spread, is_shared, visible};
+use super::{FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, Push, Spread, is_shared, visible};
 use crate::gather::{GROUPS, Group};
 use crate::links::{Link, Links};
+use crate::sampling::{hash, unit};
 use crate::skips::Skips;
 use crate::skips::tests::{room, solve};
-use glam::Vec3;
+use crate::{DiffuseMaterial, Rgb, SceneInput, Shape, Surface};
+use glam::{DVec3, Vec3};
 use std::ops::ControlFlow;
 
 const ERROR: f32 = 0.1;
@@ -44,6 +46,47 @@ fn weights_are_means_over_the_receiver() {
     }
     assert!(all > 0.0, "there are such links");
     assert!((off / all).abs() < 0.03, "leaves get {:.4} of what their links bring", 1.0 + off / all);
+}
+
+/// In a heap of balls under a lamp what is near hides what is far. What leaves would find out for themselves about the rest is found out by
+/// chance, and is the same on average.
+#[test]
+fn looks_that_are_spared_are_made_up_for() {
+    let at = |seed: u32| unit(hash(0x4ea9, seed));
+    let ball = |i: u32| {
+        let center = Vec3::new(at(4 * i), at(4 * i + 1), 0.5 * at(4 * i + 2)).as_dvec3();
+        Surface::new(Shape::Sphere { center, radius: 0.1 }, 0)
+    };
+    let corner = DVec3::new(0.2, 0.2, 1.5);
+    let (x, y) = (0.6 * DVec3::X, 0.6 * DVec3::Y);
+    let lamp = Surface::new(Shape::Quad([corner, corner + y, corner + x + y, corner + x]), 1);
+    let material =
+        |reflectance, exitance| DiffuseMaterial { reflectance, exitance: Rgb::splat(exitance), two_sided: false };
+    let materials = vec![material(Rgb::splat(0.6), 0.0), material(Rgb::ZERO, 10.0)];
+    let surfaces = std::iter::once(lamp).chain((0..40).map(ball)).collect();
+    let solver = solve(&SceneInput { surfaces, materials, ..SceneInput::default() }, ERROR, (), Skips::ALL);
+    let (light, links) = (solver.light(), &solver.links);
+    let of = |error| Push::new(light, links, Some(error), (u64::MAX, None), &mut || ControlFlow::Continue(()));
+    let (some, all) = (of(ERROR), of(0.0));
+    assert_eq!(all.spared_looks, 0, "all is looked at");
+    let looks = some.weights.len() as u64;
+    assert!(10 * some.spared_looks > looks, "{} of {looks} are spared", some.spared_looks);
+    // Power that links bring that hardly let anything through, and that leaves look at.
+    let power = |push: &Push| {
+        let mut power = 0.0;
+        for (index, &leaf) in push.places.nodes.iter().enumerate() {
+            push.each_weight(light, links, index, |at, weight| {
+                let link = &links.all()[at];
+                if some.spreads[at] == Spread::Exact && (0.0..HARDLY_VISIBLE).contains(&link.visibility) {
+                    let mean = some.means[at] * visible(link, Spread::Exact);
+                    power += f64::from(mean * weight.value * light.element(leaf).area);
+                }
+            });
+        }
+        power
+    };
+    let [some, all] = [&some, &all].map(power);
+    assert!(all > 0.0 && (some / all - 1.0).abs() < 0.05, "{some} of {all}");
 }
 
 /// Where weights do not fit in memory, leaves get about the same light.
