@@ -213,6 +213,8 @@ impl Push {
             };
             let brings = self.means[at] * visible(link, Spread::Exact);
             let known = known.as_mut().and_then(|known| known.take(light, link, (brings, place.uneven)));
+            // What few were drawn for may be much by now.
+            let known = known.filter(|_| place.chance(light, link, self.means[at]).is_none_or(|c| c <= LEAST_CHANCE));
             let mut found = known.map_or_else(find, |weight| Found { weight, ..Found::default() });
             if matches!(look, Look::Again) && !renew::is_told(light, link.sender, found.view.unwrap_or_default()) {
                 found.weight = Weight::of(slot);
@@ -628,7 +630,7 @@ impl Place {
             return Found { weight, ..Found::default() };
         }
         let shared = is_shared(light, link.receiver);
-        let chance = if shared { self.chance(light, link, mean) } else { 1.0 };
+        let chance = self.chance(light, link, mean).unwrap_or(1.0);
         if unit(hash(hash(self.node, 0x20e1), link.sender)) >= chance {
             return Found { spared: true, ..Found::default() };
         }
@@ -659,15 +661,18 @@ impl Place {
         Found { weight: weight * (seen / visible), view: view.map(|view| view * seen), rays, ..Found::default() }
     }
 
-    /// How likely a link is looked at that is for more than this place: what is seen then counts so many times as much (J. Arvo and
-    /// D. Kirk, "Particle transport and image synthesis", SIGGRAPH 1990), so that the mean of all places is what it was. In a
-    /// heap nearly all that a place could see lies behind what is near; a look at each of it found that nearly always.
-    fn chance<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32) -> f32 {
-        if link.visibility < 0.0 || link.visibility >= HARDLY_VISIBLE {
-            return 1.0;
-        }
-        let share = mean * self.turned(light, link) / self.sure;
-        if share < 1.0 { share.max(LEAST_CHANCE) } else { 1.0 }
+    /// How likely a link is looked at, if that is left to chance: one for more than this place that lets hardly any reflected light through,
+    /// as far as its segments tell. What is seen counts so many times as much (J. Arvo and D. Kirk, "Particle transport and image synthesis",
+    /// SIGGRAPH 1990), so that the mean of all places is what it was. In a heap nearly all that a place could see lies behind what
+    /// is near; a look at each of it found that nearly always.
+    fn chance<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32) -> Option<f32> {
+        let is_hardly_visible = (0.0..HARDLY_VISIBLE).contains(&link.visibility);
+        // A lamp that brings little beside others may be the only one that is switched on later.
+        let is_reflected = Group::of(light, link.sender) == Group::Rest;
+        (is_hardly_visible && is_reflected && is_shared(light, link.receiver)).then(|| {
+            let share = mean * self.turned(light, link) / self.sure;
+            if share < 1.0 { share.max(LEAST_CHANCE) } else { 1.0 }
+        })
     }
 
     /// Share of a link's sender that the place sees, by as many rays as what it `brings` is worth, and their number. The rays of all
