@@ -47,7 +47,7 @@ const HARDLY_VISIBLE: f32 = 0.2;
 /// … are looked at by chance where they bring less than this share of a leaf's light, times the square root of the tolerance: the likelier
 /// the more they bring, …
 const SURE_SHARE: f32 = 0.05;
-/// … and at least so likely. Fewer would save little: what is left is spent on what is seen.
+/// … and at least so likely: what few see counts so many times as much, which is noise.
 const LEAST_CHANCE: f32 = 0.1;
 /// So many points of a place of many leaves.
 const CLUSTER_POINTS: u32 = 8;
