@@ -376,17 +376,18 @@ fn own_light<L: LightField>(light: Light<'_, L>, leaf: u32) -> Rgb {
     }
 }
 
-/// Light that a leaf has reflected toward where a ray in some direction comes from (π times its radiance, sum of channels).
-fn reflected_from<L: LightField>(light: Light<'_, L>, sender: u32, direction: Vec3) -> f32 {
+/// Light that a place of a leaf has reflected toward where a ray in some direction comes from (π times its radiance, sum of channels).
+fn reflected_from<L: LightField>(light: Light<'_, L>, (sender, at): (u32, Vec3), direction: Vec3) -> f32 {
     // Rays read the light itself: gains are for what links make of it.
     let away = -direction;
-    let light_there = light.diffuse(sender, away) + light.directional(sender, away);
+    let light_there = light.diffuse(sender, away) + light.directional_from(sender, at, away);
     (light_there - own_light(light, sender)).max(Rgb::ZERO).element_sum()
 }
 
 /// The same by what a ray from a surface meets.
 pub(crate) fn reflected_along<L: LightField>(light: Light<'_, L>, x: Vec3, direction: Vec3, surface: u32) -> f32 {
-    seen_along(light, x, direction, surface).map_or(0.0, |(_, sender)| reflected_from(light, sender, direction))
+    let seen = seen_along(light, x, direction, surface);
+    seen.map_or(0.0, |(hit, sender)| reflected_from(light, (sender, hit.point), direction))
 }
 
 #[cfg(test)]

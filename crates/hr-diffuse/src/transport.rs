@@ -24,6 +24,9 @@ const LIKELY: f32 = 8.0;
 /// … but a peak that would bring more than so many times what is negligible may be all that a place sees.
 const UNLIKELY: f32 = 16.0;
 
+/// Cosine of the angle between what faces the same way.
+const PARALLEL: f32 = 0.99;
+
 /// Parts of surfaces that matter little and whose radius is below this share of their distance are taken for points.
 const POINT: f32 = 0.15;
 
@@ -145,6 +148,28 @@ impl<L: LightField> Light<'_, L> {
 
     /// The extension's part of [`emitted`](Self::emitted), before [`Exitant::gain`].
     pub(crate) fn directional(&self, sender: u32, away: Vec3) -> Rgb {
+        self.directional_by(sender, away, |leaf| self.field.radiance(&self.reflected[leaf as usize], away))
+    }
+
+    /// The same of a place of it.
+    pub(crate) fn directional_from(&self, sender: u32, at: Vec3, away: Vec3) -> Rgb {
+        self.directional_by(sender, away, |leaf| self.radiance_from(leaf, (sender, at), away))
+    }
+
+    /// Radiance of a place of a part of a surface by the leaf that stands for it: where both are flat and face the same way, as seen from
+    /// there.
+    pub(crate) fn radiance_from(&self, leaf: u32, (part, at): (u32, Vec3), away: Vec3) -> Rgb {
+        let ([part, standing], exitant) = ([part, leaf].map(|node| self.element(node)), &self.reflected[leaf as usize]);
+        let are_flat = [part, standing].iter().all(|element| element.is_patch() && element.is_flat());
+        if are_flat && part.normals.axis.dot(standing.normals.axis) > PARALLEL {
+            self.field.radiance_beside(exitant, (standing.normals.axis, at - standing.center), away)
+        } else {
+            self.field.radiance(exitant, away)
+        }
+    }
+
+    /// The same of leaves of this `radiance`.
+    fn directional_by(&self, sender: u32, away: Vec3, radiance: impl Fn(u32) -> Rgb) -> Rgb {
         let element = self.element(sender);
         if !element.active {
             return Rgb::ZERO;
@@ -157,7 +182,7 @@ impl<L: LightField> Light<'_, L> {
             // Radiance of a plane becomes intensity per area.
             let cosine = if part.is_flat() && !holder.is_flat() { part.normals.axis.dot(away).max(0.0) } else { 1.0 };
             if cosine > 0.0 {
-                light += self.field.radiance(&self.reflected[leaf as usize], away) * strength * (cosine * share * PI);
+                light += radiance(leaf) * strength * (cosine * share * PI);
             }
         }
         // Intensity per area over the mean cosine is mean radiance; near the terminator both fade.

@@ -83,7 +83,7 @@ impl Senders {
         let Some((hit, sender)) = seen_along(light, from.at, direction, from.surface) else { return 0.0 };
         let cosines = from.normal.dot(direction) * hit.normal.dot(direction).abs();
         let counted = self.counted(light, sender, cosines / (hit.point - from.at).length_squared(), rays);
-        reflected_from(light, sender, direction) / counted
+        reflected_from(light, (sender, hit.point), direction) / counted
     }
 
     /// What a ray toward a sender, drawn by three numbers in 0…1, adds to that. `None` where it is of no use to shoot it.
@@ -108,7 +108,7 @@ impl Senders {
             return Some(0.0);
         }
         let counted = self.counted(light, sender, cosine * cosine_there / to.length_squared(), rays);
-        Some(weight * reflected_from(light, sender, direction) / counted)
+        Some(weight * reflected_from(light, (sender, at), direction) / counted)
     }
 
     /// The number of rays that come by a leaf over that of those all over the hemisphere, which meet its points by this kernel / π.
