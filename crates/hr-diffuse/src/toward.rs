@@ -22,7 +22,7 @@ use std::f32::consts::PI;
 const NARROW: f32 = 0.02;
 /// Of a cluster's box, points are so far from its middle, in halves of its sides: a uniform box has the same variance.
 const SPREAD: f32 = 0.577;
-/// Pairs of points that a link is worth at least, if there are so many.
+/// Pairs of points that a link from what is not flat is worth, if there are so many.
 const PAIRS: usize = 16;
 /// Of what is not flat, light is divided by a mean cosine of at least this: near the terminator both fade.
 const LEAST_COSINE: f32 = 0.05;
@@ -442,6 +442,7 @@ mod tests {
             let (truth, factor) = (sum / all, light.factor_at(x, n, sender));
             let [carried, shown] = [Detail::carried(0.0), Detail::shown(0.0)]
                 .map(|detail| light.directional_at(sender, (x, n), (factor, detail)).x);
+            // Points all over the floor are enough for what is on its way, but not for what is shown.
             assert!((shown / truth - 1.0).abs() < 0.15, "{shown} of {truth} at {height}");
             assert!(
                 (carried / truth - 1.0).abs() > 0.2,
