@@ -44,11 +44,14 @@ const LEAST_SPREAD: f32 = 0.01;
 const EDGE_SHARE: f32 = 0.008;
 /// Links that let less through than this, as far as their segments tell, …
 const HARDLY_VISIBLE: f32 = 0.2;
-/// … are looked at by chance where they bring less than this share of a leaf's light, times the square root of the tolerance: the likelier
-/// the more they bring, …
+/// … are looked at by chance: the likelier the more they bring, up to this share of a leaf's light, times the square root of the tolerance, …
 const SURE_SHARE: f32 = 0.05;
-/// … and at least so likely: what few see counts so many times as much, which is noise.
+/// … those that bring next to nothing so likely, …
 const LEAST_CHANCE: f32 = 0.1;
+/// … and all of them so much less likely that no more than so many are drawn for a place, over the square root of the tolerance. What is
+/// seen of few counts the more, which is noise, yet noise that calibration takes out: with half as many as with a hundred times as many,
+/// solutions were as exact.
+const LOOKS: f32 = 5.0;
 /// So many points of a place of many leaves.
 const CLUSTER_POINTS: u32 = 8;
 /// Leaves get no more than this times what a link brings on average. Surfaces that lie in one another's plane hide each
@@ -199,22 +202,33 @@ impl Push {
         (node, weights): &mut (u32, &mut [f32]),
         look: Look<'_>,
     ) -> Looked {
-        let (mut slots, mut looked) = (weights.chunks_exact_mut(numbers(light, *node)), Looked::default());
-        let mut known = if let Look::Beyond(known) = look { Some(known.of(light.elements, *node)) } else { None };
+        let place = Place::new(light, *node, self.places.middle(light.elements, *node), self.error);
+        let mut slots = weights.chunks_exact_mut(numbers(light, *node));
+        let (mut above, mut chances) = (Vec::with_capacity(slots.len()), 0.0);
+        self.weighted_above(light.elements, *node, |at| {
+            let outlook = place.outlook(light, &links.all()[at], self.means[at]);
+            chances += outlook.chance.unwrap_or_default();
+            above.push((at, outlook));
+        });
+        // Places that could see much if nothing lay between see nearly all of it hidden.
+        let rarer = (LOOKS / (self.error.sqrt() * chances)).min(1.0);
+        let (mut looked, mut known) = (Looked::default(), None);
+        if let Look::Beyond(kept) = look {
+            known = Some(kept.of(light.elements, *node));
+        }
         let before = known.as_ref().and_then(|known| known.dim_view);
-        self.each(light, *node, |place, at| {
-            let Some(slot) = slots.next() else { return };
+        for ((at, outlook), slot) in above.into_iter().zip(&mut slots) {
             let link = &links.all()[at];
-            let plain = || Found { weight: place.plain(light, link), ..Found::default() };
+            let plain = || Found { weight: place.plain(light, link, outlook.turned), ..Found::default() };
             let find = || match look {
                 Look::Roughly => plain(),
                 Look::Beyond(known) if known.rough => plain(),
-                _ => place.weight(light, link, self.means[at], looked.rays),
+                _ => place.weight(light, link, (self.means[at], outlook, rarer), looked.rays),
             };
             let brings = self.means[at] * visible(link, Spread::Exact);
             let known = known.as_mut().and_then(|known| known.take(light, link, (brings, place.uneven)));
             // What few were drawn for may be much by now.
-            let known = known.filter(|_| place.chance(light, link, self.means[at]).is_none_or(|c| c <= LEAST_CHANCE));
+            let known = known.filter(|_| outlook.chance.is_none_or(|chance| chance <= LEAST_CHANCE));
             let mut found = known.map_or_else(find, |weight| Found { weight, ..Found::default() });
             if matches!(look, Look::Again) && !renew::is_told(light, link.sender, found.view.unwrap_or_default()) {
                 found.weight = Weight::of(slot);
@@ -225,7 +239,7 @@ impl Push {
             if let Some(view) = found.view.filter(|_| Group::of(light, link.sender) == Group::Rest) {
                 looked.dim_view += view - found.weight.value * share(light, link, Spread::Exact);
             }
-        });
+        }
         if looked.dim_view <= LEAST_DIM_VIEW {
             looked.dim_view = 0.0;
         }
@@ -307,7 +321,10 @@ impl Push {
     ) {
         let node = self.places.nodes[index];
         let Some(range) = self.first.get(index..index + 2) else {
-            return self.each(light, node, |place, at| visit(at, place.plain(light, &links.all()[at])));
+            return self.each(light, node, |place, at| {
+                let link = &links.all()[at];
+                visit(at, place.plain(light, link, place.turned(light, link)));
+            });
         };
         let mut weights = self.weights[range[0]..range[1]].chunks_exact(numbers(light, node));
         self.weighted_above(light.elements, node, |at| visit(at, weights.next().map(Weight::of).unwrap_or_default()));
@@ -478,6 +495,17 @@ enum Look<'a> {
     Again,
 }
 
+/// What a place knows of a link before it looks.
+#[derive(Clone, Copy)]
+struct Outlook {
+    /// What it would bring to the place, over what it brings to its receiver, if as much were seen of the sender from everywhere.
+    turned: f32,
+    /// Whether all of the place is far from the sender.
+    far: bool,
+    /// How likely it is looked at, if that is left to chance.
+    chance: Option<f32>,
+}
+
 /// What a place finds out about a link.
 #[derive(Default)]
 struct Found {
@@ -536,10 +564,11 @@ impl Place {
         }
     }
 
-    /// What a link brings to the place over what it brings to its receiver, by orientation and distance alone.
-    fn plain<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> Weight {
+    /// What a link brings to the place over what it brings to its receiver, by orientation and distance alone, which
+    /// make it so much more or less if it is `turned`.
+    fn plain<L: LightField>(&self, light: Light<'_, L>, link: &Link, turned: f32) -> Weight {
         let known = link.visibility.abs() / visible(link, Spread::Exact);
-        let value = self.turned(light, link) * known;
+        let value = turned * known;
         let element = light.element(self.node);
         if element.is_patch() || light.elements.is_distant(NodeId(link.sender)) {
             return Weight { value, ..Weight::default() };
@@ -616,27 +645,45 @@ impl Place {
         element.mean_cosine(direction) * scale
     }
 
-    /// The same as asked for, after so many rays shot `before`; `mean` is what the link would bring to its receiver if it were wholly
-    /// visible.
-    fn weight<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32, before: u32) -> Found {
+    /// What is known of a link without a look, where it would bring `mean` to its receiver if it were wholly visible.
+    fn outlook<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32) -> Outlook {
+        let turned = self.turned(light, link);
+        let far = self.spots(light).is_far(light.element(link.sender));
+        let outlook = Outlook { turned, far, chance: None };
+        let chance = if self.is_faint(link, mean, outlook) { None } else { self.chance(light, link, mean * turned) };
+        Outlook { chance, ..outlook }
+    }
+
+    /// Whether a link is too far and brings too little to be looked at.
+    fn is_faint(&self, link: &Link, mean: f32, outlook: Outlook) -> bool {
+        outlook.far && mean * may_be_visible(link) * outlook.turned < self.faint
+    }
+
+    /// What a link brings to the place over what it brings to its receiver, after so many rays shot `before`; `mean` is what the link would
+    /// bring to its receiver if it were wholly visible, and what is left to chance is so much `rarer`.
+    fn weight<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        link: &Link,
+        (mean, outlook, rarer): (f32, Outlook, f32),
+        before: u32,
+    ) -> Found {
         let element = light.element(self.node);
         let flat = element.is_flat();
         let visible = visible(link, Spread::Exact);
         // A place that is small or far is told apart by its orientation; so is one that gets next to nothing.
-        let sender = light.element(link.sender);
-        let far = self.spots(light).is_far(sender);
-        if far && mean * may_be_visible(link) * self.turned(light, link) < self.faint {
-            let weight = Weight { unseen: link.visibility >= 0.0, ..self.plain(light, link) };
+        if self.is_faint(link, mean, outlook) {
+            let weight = Weight { unseen: link.visibility >= 0.0, ..self.plain(light, link, outlook.turned) };
             return Found { weight, ..Found::default() };
         }
         let shared = is_shared(light, link.receiver);
-        let chance = self.chance(light, link, mean).unwrap_or(1.0);
+        let chance = outlook.chance.map_or(1.0, |chance| chance * rarer);
         if unit(hash(hash(self.node, 0x20e1), link.sender)) >= chance {
             return Found { spared: true, ..Found::default() };
         }
         let (here, view) = if !shared {
             (Weight { value: mean, ..Weight::default() }, None)
-        } else if !far && (!element.is_patch() || mean * visible > self.much) {
+        } else if !outlook.far && (!element.is_patch() || mean * visible > self.much) {
             let (here, view) = self.varying(light, link);
             (here, Some(view))
         } else if flat || !element.is_patch() {
@@ -661,18 +708,16 @@ impl Place {
         Found { weight: weight * (seen / visible), view: view.map(|view| view * seen), rays, ..Found::default() }
     }
 
-    /// How likely a link is looked at, if that is left to chance: one for more than this place that lets hardly any reflected light through,
-    /// as far as its segments tell. What is seen counts so many times as much (J. Arvo and D. Kirk, "Particle transport and image synthesis",
-    /// SIGGRAPH 1990), so that the mean of all places is what it was. In a heap nearly all that a place could see lies behind what
-    /// is near; a look at each of it found that nearly always.
-    fn chance<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32) -> Option<f32> {
+    /// How likely a link is looked at that `may_bring` so much, if that is left to chance: one for more than this place that lets hardly any
+    /// reflected light through, as far as its segments tell. What is seen counts so many times as much (J. Arvo and D. Kirk, "Particle
+    /// transport and image synthesis", SIGGRAPH 1990), so that the mean of all places is what it was. In a heap nearly all that a place
+    /// could see lies behind what is near; a look at each of it found that nearly always.
+    fn chance<L: LightField>(&self, light: Light<'_, L>, link: &Link, may_bring: f32) -> Option<f32> {
         let is_hardly_visible = (0.0..HARDLY_VISIBLE).contains(&link.visibility);
         // A lamp that brings little beside others may be the only one that is switched on later.
         let is_reflected = Group::of(light, link.sender) == Group::Rest;
-        (is_hardly_visible && is_reflected && is_shared(light, link.receiver)).then(|| {
-            let share = mean * self.turned(light, link) / self.sure;
-            if share < 1.0 { share.max(LEAST_CHANCE) } else { 1.0 }
-        })
+        let chance = || if may_bring < self.sure { (may_bring / self.sure).max(LEAST_CHANCE) } else { 1.0 };
+        (is_hardly_visible && is_reflected && is_shared(light, link.receiver)).then(chance)
     }
 
     /// Share of a link's sender that the place sees, by as many rays as what it `brings` is worth, and their number. The rays of all

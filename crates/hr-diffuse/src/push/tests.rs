@@ -1,4 +1,4 @@
-use super::{FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, Push, Spread, is_shared, visible};
+use super::{FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, LOOKS, Place, Push, Spread, is_shared, visible};
 use crate::gather::{GROUPS, Group};
 use crate::links::{Link, Links};
 use crate::sampling::{hash, unit};
@@ -55,7 +55,7 @@ fn looks_that_are_spared_are_made_up_for() {
     let at = |seed: u32| unit(hash(0x4ea9, seed));
     let ball = |i: u32| {
         let center = Vec3::new(at(4 * i), at(4 * i + 1), 0.5 * at(4 * i + 2)).as_dvec3();
-        Surface::new(Shape::Sphere { center, radius: 0.1 }, 0)
+        Surface::new(Shape::Sphere { center, radius: 0.07 }, 0)
     };
     let corner = DVec3::new(0.2, 0.2, 1.5);
     let (x, y) = (0.6 * DVec3::X, 0.6 * DVec3::Y);
@@ -63,7 +63,7 @@ fn looks_that_are_spared_are_made_up_for() {
     let material =
         |reflectance, exitance| DiffuseMaterial { reflectance, exitance: Rgb::splat(exitance), two_sided: false };
     let materials = vec![material(Rgb::splat(0.6), 0.0), material(Rgb::ZERO, 10.0)];
-    let surfaces = std::iter::once(lamp).chain((0..40).map(ball)).collect();
+    let surfaces = std::iter::once(lamp).chain((0..120).map(ball)).collect();
     let solver = solve(&SceneInput { surfaces, materials, ..SceneInput::default() }, ERROR, (), Skips::ALL);
     let (light, links) = (solver.light(), &solver.links);
     let of = |error| Push::new(light, links, Some(error), (u64::MAX, None), &mut || ControlFlow::Continue(()));
@@ -71,6 +71,18 @@ fn looks_that_are_spared_are_made_up_for() {
     assert_eq!(all.spared_looks, 0, "all is looked at");
     let looks = some.weights.len() as u64;
     assert!(10 * some.spared_looks > looks, "{} of {looks} are spared", some.spared_looks);
+    // Many places would draw more looks than they may: theirs are made rarer.
+    let chances = |&node: &u32| {
+        let place = Place::new(light, node, some.places.middle(light.elements, node), ERROR);
+        let mut chances = 0.0;
+        some.weighted_above(light.elements, node, |at| {
+            chances += place.outlook(light, &links.all()[at], some.means[at]).chance.unwrap_or_default();
+        });
+        chances
+    };
+    let many = some.places.nodes.iter().filter(|node| chances(node) > LOOKS / ERROR.sqrt()).count();
+    let places = some.places.nodes.len();
+    assert!(3 * many > places, "{many} of {places} places");
     // Power that links bring that hardly let anything through, and that leaves look at.
     let power = |push: &Push| {
         let mut power = 0.0;
