@@ -204,18 +204,9 @@ impl Push {
     ) -> Looked {
         let place = Place::new(light, *node, self.places.middle(light.elements, *node), self.error);
         let mut slots = weights.chunks_exact_mut(numbers(light, *node));
-        let (mut above, mut chances) = (Vec::with_capacity(slots.len()), 0.0);
-        self.weighted_above(light.elements, *node, |at| {
-            let outlook = place.outlook(light, &links.all()[at], self.means[at]);
-            chances += outlook.chance.unwrap_or_default();
-            above.push((at, outlook));
-        });
-        // Places that could see much if nothing lay between see nearly all of it hidden.
-        let rarer = (LOOKS / (self.error.sqrt() * chances)).min(1.0);
-        let (mut looked, mut known) = (Looked::default(), None);
-        if let Look::Beyond(kept) = look {
-            known = Some(kept.of(light.elements, *node));
-        }
+        let mut looked = Looked::default();
+        let mut known = if let Look::Beyond(known) = look { Some(known.of(light.elements, *node)) } else { None };
+        let (above, rarer) = self.outlooks(light, links, &place);
         let before = known.as_ref().and_then(|known| known.dim_view);
         for ((at, outlook), slot) in above.into_iter().zip(&mut slots) {
             let link = &links.all()[at];
@@ -244,6 +235,23 @@ impl Push {
             looked.dim_view = 0.0;
         }
         Looked { dim_view: before.unwrap_or(looked.dim_view), ..looked }
+    }
+
+    /// What a place knows of the links above it that have weights, by position among all, and how much rarer its looks by chance are than
+    /// each link for itself asks for.
+    fn outlooks<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        links: &Links,
+        place: &Place,
+    ) -> (Vec<(usize, Outlook)>, f32) {
+        let (mut above, mut chances) = (Vec::new(), 0.0);
+        self.weighted_above(light.elements, place.node, |at| {
+            let outlook = place.outlook(light, &links.all()[at], self.means[at]);
+            chances += outlook.chance.unwrap_or_default();
+            above.push((at, outlook));
+        });
+        (above, (LOOKS / (self.error.sqrt() * chances)).min(1.0))
     }
 
     /// Places have the ids that they have after [`Elements::graft`].

@@ -1,4 +1,4 @@
-use super::{FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, LOOKS, Place, Push, Spread, is_shared, visible};
+use super::{FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, Place, Push, Spread, is_shared, visible};
 use crate::gather::{GROUPS, Group};
 use crate::links::{Link, Links};
 use crate::sampling::{hash, unit};
@@ -72,15 +72,11 @@ fn looks_that_are_spared_are_made_up_for() {
     let looks = some.weights.len() as u64;
     assert!(10 * some.spared_looks > looks, "{} of {looks} are spared", some.spared_looks);
     // Many places would draw more looks than they may: theirs are made rarer.
-    let chances = |&node: &u32| {
+    let are_rarer = |&&node: &&u32| {
         let place = Place::new(light, node, some.places.middle(light.elements, node), ERROR);
-        let mut chances = 0.0;
-        some.weighted_above(light.elements, node, |at| {
-            chances += place.outlook(light, &links.all()[at], some.means[at]).chance.unwrap_or_default();
-        });
-        chances
+        some.outlooks(light, links, &place).1 < 1.0
     };
-    let many = some.places.nodes.iter().filter(|node| chances(node) > LOOKS / ERROR.sqrt()).count();
+    let many = some.places.nodes.iter().filter(are_rarer).count();
     let places = some.places.nodes.len();
     assert!(3 * many > places, "{many} of {places} places");
     // Power that links bring that hardly let anything through, and that leaves look at.
