@@ -47,8 +47,8 @@ const MOST_SPREAD: f64 = 100.0;
 /// One ray of so many goes where links say that light comes from; the others, all over the hemisphere, know more of what is even.
 const ONE_OF: u32 = 4;
 const RAYS: Rays = Rays { all_over: 1.0 - 1.0 / ONE_OF as f32, toward: 1.0 / ONE_OF as f32 };
-/// Places that a thread looks from between two calls of `watch`: some milliseconds.
-const BETWEEN_WATCHES: usize = 64;
+/// Rays that a thread shoots between two calls of `watch`, about: some milliseconds.
+const BETWEEN_WATCHES: usize = 4096;
 
 /// What rays from a place are expected to find of reflected light, as links bring it (sum of channels).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -162,11 +162,12 @@ pub(crate) fn calibrate<L: LightField>(
         sums
     };
     let mut found: Vec<Sums> = Vec::with_capacity(expected.len());
+    let between_watches = (BETWEEN_WATCHES * expected.len() / rays.max(1)).max(1) * threads::current_num_threads();
     while found.len() < expected.len() {
         if watch().is_break() {
             return None;
         }
-        let part = found.len()..expected.len().min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
+        let part = found.len()..expected.len().min(found.len() + between_watches);
         found.extend(threads::map_range(part, 8, look));
     }
     let factors = factors(light.elements, expected.iter().map(|of| of.place).zip(found), OF_LINKS);

@@ -22,6 +22,7 @@ pub mod cone;
 mod contact_shadows;
 mod contacts;
 mod convergence;
+mod effort;
 pub mod error;
 mod exposed;
 pub mod face_clusters;

@@ -8,6 +8,7 @@
 
 use crate::NodeId;
 use crate::all_over::{Points, Spots};
+use crate::effort::effort;
 use crate::gather::{GROUPS, Group, share};
 use crate::hierarchy::{Element, Elements, GRAFT, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
@@ -27,7 +28,8 @@ use std::ops::{ControlFlow, Mul};
 /// No more weights than these are kept: 256 MB. In larger scenes the leaves beyond have weights by orientation and distance
 /// alone, which are found anew in each iteration.
 const MOST_KEPT: usize = 1 << 26;
-/// Links that bring less than this share of all that arrives, times the square root of the tolerance, are not looked at closely.
+/// Links that bring less than this share of all that arrives, times the square root of the tolerance and over the
+/// [effort](crate::effort), are not looked at closely.
 const FAINT_SHARE: f32 = 0.003;
 /// Leaves look for themselves at links of their own that bring more than this share of their light: others let so much through as
 /// their segments found.
@@ -59,8 +61,8 @@ const CLUSTER_POINTS: u32 = 8;
 /// eighth of what a glossy sphere sends was cut off.
 const MOST_WEIGHT: f32 = 64.0;
 
-/// Rays for a link that brings all light of a leaf; others in proportion, within limits. A single one tells nothing of
-/// the directions that matter more than others.
+/// Rays for a link that brings all light of a leaf, of the usual [effort](crate::effort); others in proportion, within limits. A single
+/// one tells nothing of the directions that matter more than others.
 const RAYS: f32 = 64.0;
 const LEAST_RAYS: f32 = 2.0;
 const MOST_RAYS: f32 = 16.0;
@@ -420,7 +422,7 @@ fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -
     let even = if receiver.is_flat() || link.visibility == 0.0 { Spread::Even } else { Spread::Plain };
     let mean = light.emitted_toward(link).element_sum() * link.factor;
     let least = match (is_shared(light, link.receiver), error) {
-        (true, error) => FAINT_SHARE * error.unwrap_or(1.0).sqrt(),
+        (true, error) => faint_share(error.unwrap_or(1.0)),
         (false, Some(_)) if link.visibility >= 0.0 => OWN_SHARE,
         // Nothing is left to be found out, or nobody looks.
         (false, _) => f32::INFINITY,
@@ -429,6 +431,11 @@ fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -
     let irradiance = light.exitant.irradiance[link.receiver as usize].element_sum();
     let closely = mean > 0.0 && irradiance > 0.0 && mean * may_be_visible >= least * irradiance;
     (if closely { Spread::Exact } else { even }, mean)
+}
+
+/// Links that bring a leaf less than this share of its light are not looked at closely.
+fn faint_share(error: f32) -> f32 {
+    FAINT_SHARE * error.sqrt() / effort(error)
 }
 
 /// What a link may let through, for all that is known without a look.
@@ -554,6 +561,8 @@ struct Place {
     uneven: f32,
     /// … and more is looked at whatever links let through (sum of channels).
     sure: f32,
+    /// So many times as many rays as usual find what is seen.
+    effort: f32,
 }
 
 impl Place {
@@ -566,7 +575,8 @@ impl Place {
             points: points_of(light, node),
             much: MUCH_SHARE * error.sqrt() * irradiance.element_sum(),
             negligible: negligible(irradiance, error),
-            faint: FAINT_SHARE * error.sqrt() * irradiance.element_sum(),
+            faint: faint_share(error) * irradiance.element_sum(),
+            effort: effort(error),
             uneven: UNEVEN_SHARE * error * irradiance.element_sum(),
             sure: SURE_SHARE * error.sqrt() * irradiance.element_sum(),
         }
@@ -732,7 +742,8 @@ impl Place {
     /// links go on with one sequence of points, so that they are spread evenly over the place.
     fn seen<L: LightField>(&self, light: Light<'_, L>, link: &Link, brings: f32, before: u32) -> (f32, u32) {
         let irradiance = light.exitant.irradiance[self.node as usize].element_sum();
-        let rays = (RAYS * brings / irradiance.max(f32::MIN_POSITIVE)).clamp(LEAST_RAYS, MOST_RAYS) as u32;
+        let rays = self.effort * RAYS * brings / irradiance.max(f32::MIN_POSITIVE);
+        let rays = rays.clamp(LEAST_RAYS, self.effort * MOST_RAYS) as u32;
         let (mut blocker, seed) = (u32::MAX, hash(self.node, 0x1eaf));
         let sequence = (seed, before..before + rays);
         let (seen, total, rays) = visibility(light, self.node, link.sender, sequence, (&Proof::Unknown, &mut blocker));

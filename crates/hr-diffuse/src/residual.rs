@@ -47,8 +47,10 @@ pub(crate) struct Residual {
     pub(crate) absolute: f32,
     /// … and the same with its sign: positive where there should be more light.
     pub(crate) signed: f32,
-    /// Relative standard error of `absolute`.
+    /// How much more `absolute` may be (a standard error).
     pub(crate) uncertain: f32,
+    /// The rays' own noise in what was found, relative to the mean irradiance; `absolute` is without it.
+    pub(crate) noise: f32,
     /// Share of the light that was reflected before.
     pub(crate) indirect: f32,
     /// Rays shot.
@@ -63,7 +65,7 @@ impl Residual {
 
     /// Whether a relative error may be this one, for all that is known (two standard errors).
     pub(crate) fn may_be(&self, error: f32) -> bool {
-        (self.error() - error).abs() < 2.0 * self.uncertain * self.error()
+        (self.error() - error).abs() < 2.0 * self.uncertain
     }
 
     /// Relative L1 error of the solution: what has one sign is repeated by each bounce, the rest averages out.
@@ -85,11 +87,28 @@ struct Found {
     rays: u32,
 }
 
-/// Looks at a solution from so many random leaves, if known with what its links bring; `None` where `watch` breaks.
+/// How closely a solution is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Look {
+    /// From so many leaves, …
+    pub(crate) leaves: usize,
+    /// … over a grid of directions with so many times as many sides as usual, and its square times as many rays toward emitters.
+    pub(crate) finer: u32,
+}
+
+impl Look {
+    /// Four times as many rays, where they tell the most: each leaf's own, or those of more leaves.
+    pub(crate) fn closer(self, found: &Residual) -> Self {
+        let is_noise = found.noise > found.absolute;
+        if is_noise { Self { finer: 2 * self.finer, ..self } } else { Self { leaves: 4 * self.leaves, ..self } }
+    }
+}
+
+/// Looks at a solution from random leaves, if known with what its links bring; `None` where `watch` breaks.
 pub(crate) fn residual<L: LightField>(
     light: Light<'_, L>,
     brought: Option<&Brought<'_>>,
-    count: usize,
+    how: Look,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Residual> {
     // Leaves are drawn by what they reflect: half of them as if all were lit alike, half as they are.
@@ -119,30 +138,32 @@ pub(crate) fn residual<L: LightField>(
         return Some(Residual::default());
     }
     let emitters = Emitters::new(light);
+    let Look { leaves, finer } = how;
     let look = |i: usize| {
-        let at = (i as f64 + f64::from(unit(hash(i as u32, 0x51de)))) / count as f64 * sum;
+        let at = (i as f64 + f64::from(unit(hash(i as u32, 0x51de)))) / leaves as f64 * sum;
         let leaf = ends[ends.partition_point(|&(_, end)| end <= at).min(ends.len() - 1)].0;
         let senders = brought.map(|brought| Senders::of(light, leaf, brought));
-        look(light, (&emitters, senders.as_ref()), mean as f32, leaf, i as u32)
+        Place { leaf, emitters: &emitters, senders, mean: mean as f32, finer }.look(light, i as u32)
     };
-    let mut found: Vec<Found> = Vec::with_capacity(count);
-    while found.len() < count {
+    let mut found: Vec<Found> = Vec::with_capacity(leaves);
+    while found.len() < leaves {
         if watch().is_break() {
             return None;
         }
-        let part = found.len()..count.min(found.len() + BETWEEN_WATCHES * threads::current_num_threads());
+        let each = (BETWEEN_WATCHES / (finer * finer) as usize).max(1);
+        let part = found.len()..leaves.min(found.len() + each * threads::current_num_threads());
         found.extend(threads::map_range(part, 1, look));
     }
-    let (mut absolute, mut squares, mut noise, mut signed, mut total, mut direct, mut rays) =
-        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0);
+    let (mut off_by, mut noise) = (Deviations::default(), Deviations::default());
+    let (mut signed, mut total, mut direct, mut rays) = (0.0, 0.0, 0.0, 0);
     for leaf in &found {
         let [a, b] = leaf.estimates.map(f64::from);
         let solution = f64::from(leaf.solution);
         let share = (mean + solution).recip();
         let off = 0.5 * (a + b) - solution;
-        absolute += share * off.abs();
-        squares += (share * off).powi(2);
-        noise += share * (0.5 * (a - b)).abs();
+        off_by.add(share * off);
+        // Half the difference of the estimates is distributed as the noise of their mean.
+        noise.add(share * 0.5 * (a - b));
         signed += share * off;
         total += share * 0.5 * (a + b);
         direct += share * f64::from(leaf.direct);
@@ -151,16 +172,37 @@ pub(crate) fn residual<L: LightField>(
     if total <= 0.0 {
         return Some(Residual { rays, ..Residual::default() });
     }
-    let uncertain = squares.sqrt() / absolute.max(f64::MIN_POSITIVE);
-    // Half the difference of the estimates is distributed as the noise of their mean.
-    let absolute = (absolute * absolute - noise * noise).max(0.0).sqrt();
+    // Of the difference of the squares, whose standard error is that of both.
+    let square = (off_by.sum.powi(2) - noise.sum.powi(2)).max(0.0);
+    let doubt = 2.0 * (off_by.sum * off_by.doubt()).hypot(noise.sum * noise.doubt());
+    let uncertain = (square + doubt).sqrt() - square.sqrt();
     Some(Residual {
-        absolute: (absolute / total) as f32,
+        absolute: (square.sqrt() / total) as f32,
         signed: (signed / total) as f32,
-        uncertain: uncertain as f32,
+        uncertain: (uncertain / total) as f32,
+        noise: (noise.sum / total) as f32,
         indirect: (1.0 - direct / total).clamp(0.0, 1.0) as f32,
         rays,
     })
+}
+
+/// A sum of absolute values.
+#[derive(Clone, Copy, Debug, Default)]
+struct Deviations {
+    sum: f64,
+    squares: f64,
+}
+
+impl Deviations {
+    fn add(&mut self, value: f64) {
+        self.sum += value.abs();
+        self.squares += value * value;
+    }
+
+    /// About the standard error of the sum.
+    fn doubt(&self) -> f64 {
+        self.squares.sqrt()
+    }
 }
 
 /// A few nodes.
@@ -246,30 +288,39 @@ fn point<L: LightField>(light: Light<'_, L>, leaf: u32, u: Vec2) -> (Vec3, Vec3,
     (x, if element.kind == Kind::Back { -normal } else { normal }, area)
 }
 
-/// Looks around from all over a leaf.
-fn look<L: LightField>(
-    light: Light<'_, L>,
-    (emitters, senders): (&Emitters, Option<&Senders>),
-    mean: f32,
+/// A leaf that is looked from.
+struct Place<'a> {
     leaf: u32,
-    seed: u32,
-) -> Found {
-    let solution = light.exitant.irradiance[leaf as usize].element_sum();
-    let count = (TOWARD_EMITTERS as f32 * (solution / mean).clamp(1.0, MOST_BRIGHT)) as u32;
-    let mut found = Found { estimates: [0.0; 2], direct: 0.0, solution, rays: 0 };
-    for half in 0..2 {
-        let seed = hash(seed, 0x77 + half);
-        let (lights, shot) = from_lights(light, emitters, leaf, seed);
-        let (surfaces, also) = from_emitters(light, emitters, leaf, (seed, count));
-        found.direct += 0.5 * (lights + surfaces);
-        let (reflected, looked) = match senders {
-            Some(senders) => reflected_by(light, senders, leaf, seed),
-            None => (reflected(light, leaf, seed), GRID * GRID),
-        };
-        found.estimates[half as usize] = lights + surfaces + reflected;
-        found.rays += shot + also + looked;
+    emitters: &'a Emitters,
+    senders: Option<Senders>,
+    /// Mean irradiance of all leaves, sum of channels.
+    mean: f32,
+    /// See [`Look::finer`].
+    finer: u32,
+}
+
+impl Place<'_> {
+    /// Looks around from all over the leaf.
+    fn look<L: LightField>(&self, light: Light<'_, L>, seed: u32) -> Found {
+        let &Self { leaf, emitters, mean, finer, .. } = self;
+        let solution = light.exitant.irradiance[leaf as usize].element_sum();
+        let times = (solution / mean).clamp(1.0, MOST_BRIGHT) * (finer * finer) as f32;
+        let count = (TOWARD_EMITTERS as f32 * times) as u32;
+        let mut found = Found { estimates: [0.0; 2], direct: 0.0, solution, rays: 0 };
+        for half in 0..2 {
+            let seed = hash(seed, 0x77 + half);
+            let (lights, shot) = from_lights(light, emitters, leaf, seed);
+            let (surfaces, also) = from_emitters(light, emitters, leaf, (seed, count));
+            found.direct += 0.5 * (lights + surfaces);
+            let (reflected, looked) = match &self.senders {
+                Some(senders) => reflected_by(light, senders, leaf, (seed, finer)),
+                None => (reflected(light, leaf, (seed, finer)), (GRID * finer).pow(2)),
+            };
+            found.estimates[half as usize] = lights + surfaces + reflected;
+            found.rays += shot + also + looked;
+        }
+        found
     }
-    found
 }
 
 /// Irradiance by lights without extent at a random point, and the rays shot for it.
@@ -307,7 +358,8 @@ fn from_emitters<L: LightField>(
     for ray in 0..count {
         let u = point4(seed, ray);
         let (x, n, _) = point(light, leaf, Vec2::new(u.z, u.w));
-        let Some((emitter, probability)) = emitters.pick(light, seen.clone(), x, unit(hash(seed, ray))) else {
+        let choice = (ray as f32 + unit(hash(seed, ray))) / count as f32;
+        let Some((emitter, probability)) = emitters.pick(light, seen.clone(), x, choice) else {
             continue;
         };
         let (at, normal, _) = point(light, emitter, Vec2::new(u.x, u.y));
@@ -325,34 +377,45 @@ fn from_emitters<L: LightField>(
     (sum / count as f32, rays)
 }
 
-/// Points of a leaf, with normals, and stratified directions from there.
-fn around<L: LightField>(light: Light<'_, L>, leaf: u32, seed: u32) -> impl Iterator<Item = (Vec3, Vec3, Vec3)> {
-    (0..GRID * GRID).map(move |cell| {
+/// Points of a leaf, with normals, and stratified directions from there: over a grid with so many sides.
+fn around<L: LightField>(
+    light: Light<'_, L>,
+    leaf: u32,
+    (seed, sides): (u32, u32),
+) -> impl Iterator<Item = (Vec3, Vec3, Vec3)> {
+    (0..sides * sides).map(move |cell| {
         let u = point4(seed ^ 0x3c3c, cell);
         let (x, n, _) = point(light, leaf, Vec2::new(u.z, u.w));
-        let direction = (Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + Vec2::new(u.x, u.y)) / GRID as f32;
+        let direction = (Vec2::new((cell % sides) as f32, (cell / sides) as f32) + Vec2::new(u.x, u.y)) / sides as f32;
         (x, n, cosine_direction(n, direction.x, direction.y))
     })
 }
 
 /// Mean irradiance by light that has been reflected, over stratified directions.
-fn reflected<L: LightField>(light: Light<'_, L>, leaf: u32, seed: u32) -> f32 {
-    let surface = light.element(leaf).source;
-    let found = around(light, leaf, seed).map(|(x, _, direction)| reflected_along(light, x, direction, surface));
-    found.sum::<f32>() / (GRID * GRID) as f32
+fn reflected<L: LightField>(light: Light<'_, L>, leaf: u32, (seed, finer): (u32, u32)) -> f32 {
+    let (surface, sides) = (light.element(leaf).source, GRID * finer);
+    let found = around(light, leaf, (seed, sides));
+    found.map(|(x, _, direction)| reflected_along(light, x, direction, surface)).sum::<f32>() / (sides * sides) as f32
 }
 
 /// The same by rays toward senders, too, and the number of rays.
-fn reflected_by<L: LightField>(light: Light<'_, L>, senders: &Senders, leaf: u32, seed: u32) -> (f32, u32) {
+fn reflected_by<L: LightField>(
+    light: Light<'_, L>,
+    senders: &Senders,
+    leaf: u32,
+    (seed, finer): (u32, u32),
+) -> (f32, u32) {
     let surface = light.element(leaf).source;
-    let each = Rays { all_over: (GRID * GRID) as f32, toward: TOWARD_SENDERS as f32 };
+    let (sides, count) = (GRID * finer, TOWARD_SENDERS * finer * finer);
+    let each = Rays { all_over: (sides * sides) as f32, toward: count as f32 };
     let from = |at, normal| ReceivingPoint { at, normal, surface };
-    let found = around(light, leaf, seed).map(|(x, n, direction)| senders.all_over(light, from(x, n), direction, each));
-    let (mut sum, mut rays) = (found.sum::<f32>(), GRID * GRID);
-    for ray in 0..TOWARD_SENDERS {
+    let found = around(light, leaf, (seed, sides));
+    let found = found.map(|(x, n, direction)| senders.all_over(light, from(x, n), direction, each));
+    let (mut sum, mut rays) = (found.sum::<f32>(), sides * sides);
+    for ray in 0..count {
         let u = point4(seed ^ 0x5e4d, ray);
         let (x, n, _) = point(light, leaf, Vec2::new(u.z, u.w));
-        let choice = (ray as f32 + unit(hash(hash(seed, 0x5e), ray))) / TOWARD_SENDERS as f32;
+        let choice = (ray as f32 + unit(hash(hash(seed, 0x5e), ray))) / count as f32;
         if let Some(found) = senders.toward(light, from(x, n), (choice, Vec2::new(u.x, u.y)), each) {
             (sum, rays) = (sum + found, rays + 1);
         }
@@ -400,10 +463,33 @@ mod tests {
     #[test]
     fn errors_are_unclear_within_two_standard_errors() {
         let found = |absolute, uncertain| Residual { absolute, uncertain, ..Residual::default() };
-        assert!(found(0.09, 0.1).may_be(0.1) && found(0.11, 0.1).may_be(0.1));
-        assert!(!found(0.05, 0.2).may_be(0.1), "it is fine for sure");
-        assert!(!found(0.2, 0.2).may_be(0.1), "it is not for sure");
-        assert!(!found(0.09, 0.01).may_be(0.1), "it is known well");
+        assert!(found(0.09, 0.01).may_be(0.1) && found(0.11, 0.01).may_be(0.1));
+        assert!(!found(0.05, 0.01).may_be(0.1), "it is fine for sure");
+        assert!(!found(0.2, 0.04).may_be(0.1), "it is not for sure");
+        assert!(!found(0.09, 0.001).may_be(0.1), "it is known well");
+    }
+
+    #[test]
+    fn looks_get_closer_where_they_tell_the_most() {
+        let look = Look { leaves: 100, finer: 1 };
+        let found = |absolute, noise| Residual { absolute, noise, ..Residual::default() };
+        assert_eq!(look.closer(&found(0.01, 0.02)), Look { leaves: 100, finer: 2 }, "noise hides what is off");
+        assert_eq!(look.closer(&found(0.02, 0.01)), Look { leaves: 400, finer: 1 });
+    }
+
+    /// Sixteen times as many rays from each leaf leave a fourth of the noise, and find the same to what was known of it.
+    #[test]
+    fn more_rays_leave_less_noise() {
+        let solver = shade();
+        let found = [1, 4].map(|finer| {
+            residual(solver.light(), None, Look { leaves: 400, finer }, &mut || ControlFlow::Continue(()))
+                .expect("nobody breaks")
+        });
+        let [usual, finer] = found;
+        assert!(finer.noise < 0.35 * usual.noise, "{found:?}");
+        assert!(finer.uncertain < usual.uncertain, "{found:?}");
+        let apart = (usual.absolute - finer.absolute).abs();
+        assert!(apart < 3.0 * usual.uncertain.max(finer.uncertain), "{found:?}");
     }
 
     /// A dark room with a lamp for its ceiling and a small white plate off the floor, which reflects most of what walls get of
@@ -463,9 +549,9 @@ mod tests {
         solver.solve(&mut |_| ControlFlow::Continue(()));
         let leaf = solver.elements.patch_leaves().find(|&leaf| solver.elements.nodes[leaf as usize].source == 1);
         let leaf = leaf.expect("the lamp has leaves");
-        let as_it_is = reflected(solver.light(), leaf, 1);
+        let as_it_is = reflected(solver.light(), leaf, (1, 1));
         solver.exitant.gain.fill(0.5);
-        assert!(as_it_is > 0.0 && reflected(solver.light(), leaf, 1) == as_it_is, "{as_it_is}");
+        assert!(as_it_is > 0.0 && reflected(solver.light(), leaf, (1, 1)) == as_it_is, "{as_it_is}");
     }
 
     /// Whatever links say, rays toward what they do find the same light as rays all over the hemisphere; where they are right, with less
@@ -483,13 +569,13 @@ mod tests {
                 |&leaf: &u32| light.element(leaf).source == surface && light.element(leaf).importance > 0.0;
             let mut checked = 0;
             for leaf in light.elements.patch_leaves().filter(is_checked).step_by(every) {
-                let all_over: Vec<f64> = (0..600).map(|seed| f64::from(reflected(light, leaf, seed))).collect();
+                let all_over: Vec<f64> = (0..600).map(|seed| f64::from(reflected(light, leaf, (seed, 1)))).collect();
                 let (mean, noise) = mean_and_deviation(&all_over);
                 for (arriving, is_right) in [(arriving, true), (wrong.as_slice(), false)] {
                     let brought = Brought { links: &solver.links, arriving, shares: light.reflected_shares() };
                     let senders = Senders::of(light, leaf, &brought);
                     let toward: Vec<f64> =
-                        (0..600).map(|seed| f64::from(reflected_by(light, &senders, leaf, seed).0)).collect();
+                        (0..600).map(|seed| f64::from(reflected_by(light, &senders, leaf, (seed, 1)).0)).collect();
                     let (found, less) = mean_and_deviation(&toward);
                     let doubt = 4.0 * (noise * noise + less * less).sqrt() / 600.0_f64.sqrt();
                     assert!((found - mean).abs() < doubt, "{surface}, {leaf}: {found}, not {mean} ± {doubt}");

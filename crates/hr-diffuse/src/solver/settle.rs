@@ -3,11 +3,12 @@
 use super::{Pass, Phase, Progress, Solver, Transport};
 use crate::Rgb;
 use crate::clock::Instant;
+use crate::effort::effort;
 use crate::hooks::LightField;
 use crate::misjudged::Misjudged;
 use crate::reflect::Reflect;
 use crate::relight::ratio;
-use crate::residual::{Brought, RAYS_PER_LEAF, Residual, residual};
+use crate::residual::{Brought, Look, RAYS_PER_LEAF, Residual, residual};
 use crate::sent::Sent;
 use crate::transport::Exitant;
 use std::ops::ControlFlow;
@@ -24,14 +25,12 @@ const FEW_ITERATIONS: u32 = 3;
 const MOST_FOLLOWED: usize = 4;
 /// … where more than this times the pass's tolerance of all light waits.
 const FOLLOWED_SHARE: f32 = 0.1;
-/// So many rays for each place are worth knowing how much reflected light links should bring.
-const CALIBRATE_RAYS: usize = 64;
+/// So many rays for each place, of the usual [effort](crate::effort), are worth knowing how much reflected light links should bring.
+const CALIBRATE_RAYS: f32 = 64.0;
 /// This share of the rays shot so far is worth knowing what the solution is off by, …
 const CHECK_SHARE: f32 = 0.1;
-/// … from at least and at most so many leaves; …
+/// … from at least and at most so many leaves, and once more more closely where that does not tell whether it is fine enough.
 const CHECKED_LEAVES: [u64; 2] = [64, 2000];
-/// … and once more from so many times as many where that does not tell whether it is fine enough.
-const AGAIN: usize = 4;
 /// From one iteration to the next no more of a change is left than the share that the brightest material reflects, and this.
 const REFLECTED_MARGIN: f32 = 0.02;
 
@@ -211,7 +210,8 @@ impl<L: LightField> Solver<L> {
         let (start, account) = (Instant::now(), self.account);
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         let mut gather = std::mem::take(&mut self.gather);
-        let shot = gather.calibrate(self.light(), &self.links, CALIBRATE_RAYS, &mut || {
+        let rays = (CALIBRATE_RAYS * effort(pass.tolerance).powi(2)) as usize;
+        let shot = gather.calibrate(self.light(), &self.links, rays, &mut || {
             *stopped = *stopped || watch(&progress).is_break();
             if *stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
@@ -232,19 +232,19 @@ impl<L: LightField> Solver<L> {
         let [least, most] = CHECKED_LEAVES;
         let count = (CHECK_SHARE * self.stats.rays as f32 / RAYS_PER_LEAF as f32) as u64;
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
-        let count = count.clamp(least, most) as usize;
+        let first = Look { leaves: count.clamp(least, most) as usize, finer: 1 };
         // Of what is shot, the last of it: it comes from where all did.
         let brought = Brought::known(self.light(), &self.links, self.gather.arriving());
-        let mut look = |count| {
-            residual(self.light(), brought.as_ref(), count, &mut || {
+        let mut look = |how| {
+            residual(self.light(), brought.as_ref(), how, &mut || {
                 *stopped = *stopped || watch(&progress).is_break();
                 if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
         };
-        let mut found = look(count);
+        let mut found = look(first);
         if let Some(unclear) = found.filter(|found| found.may_be(self.settings.error)) {
             // A look costs little beside a pass more.
-            found = look(AGAIN * count).map(|found| Residual { rays: unclear.rays + found.rays, ..found });
+            found = look(first.closer(&unclear)).map(|found| Residual { rays: unclear.rays + found.rays, ..found });
         }
         if let Some(residual) = &found {
             self.stats.error = Some(residual.error());
