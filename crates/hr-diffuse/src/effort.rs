@@ -5,8 +5,9 @@
 
 /// The tolerance of links of a pass in which rays are as many as usual: that of the first close look toward an error of 0.05.
 const USUAL: f32 = 0.16;
-/// No more than this, squared, times as many are worth the while.
-const MOST: f32 = 16.0;
+/// More is not worth the while: passes that go on in vain would take the longer. With 16 a room into which a lamp without extent shines
+/// through a small window took minutes.
+const MOST: f32 = 2.5;
 
 /// How many times finer than usual a pass of some tolerance is to know what rays find; where all is looked at, whatever it brings
 /// (a tolerance of nothing), as usual.

@@ -83,11 +83,11 @@ impl Unfinished {
     /// Takes note of a pass, and of the error that was found after it, if anybody looked.
     pub(crate) fn done(&mut self, tolerance: f32, found: Option<&Residual>) {
         let finer = tolerance <= 0.5 * self.tolerance;
-        let at_most = |found: &Residual| found.error() + found.uncertain;
-        let known = |found: &Residual| found.uncertain < KNOWN * found.error();
-        let no_better = |found: &Residual| at_most(found) > NO_BETTER * self.found && known(found);
+        let at_most = |found: &Residual| found.error() * (1.0 + found.uncertain);
+        let no_better = |found: &Residual| at_most(found) > NO_BETTER * self.found && found.uncertain < KNOWN;
         let halves = (self.tolerance / tolerance).log2();
-        let much_better = |found: &Residual| at_most(found) <= NO_BETTER.powf(halves) * self.found && known(found);
+        let much_better =
+            |found: &Residual| at_most(found) <= NO_BETTER.powf(halves) * self.found && found.uncertain < KNOWN;
         self.gained = finer && self.found.is_finite() && found.is_some_and(much_better);
         self.in_vain = finer && found.is_some_and(no_better);
         (self.tolerance, self.found) = (tolerance, found.map_or(f32::INFINITY, at_most));
@@ -156,8 +156,7 @@ mod tests {
         let mut passes = Vec::new();
         while let Some(tolerance) = unfinished.next(settings) {
             let (_, closely) = is_worth(tolerance, settings.tolerance());
-            let absolute = found(tolerance);
-            let found = Residual { absolute, uncertain: uncertain * absolute, ..Residual::default() };
+            let found = Residual { absolute: found(tolerance), uncertain, ..Residual::default() };
             unfinished.done(tolerance, closely.then_some(&found));
             passes.push(tolerance);
         }
