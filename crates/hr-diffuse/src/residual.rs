@@ -558,7 +558,7 @@ mod tests {
     /// noise where it comes from something small.
     #[test]
     fn rays_toward_senders_find_the_same() {
-        for (solver, (surface, every), is_small) in [(dark_room(), (3, 7), true), (shade(), (2, 200), false)] {
+        for (solver, (surface, every), is_small) in [(dark_room(), (3, 5), true), (shade(), (2, 200), false)] {
             let (light, arriving) = (solver.light(), solver.gather.arriving());
             let wrong: Vec<Rgb> = arriving.iter().rev().copied().collect();
             let mean_and_deviation = |values: &[f64]| {
