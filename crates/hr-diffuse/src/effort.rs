@@ -5,14 +5,30 @@
 
 /// The tolerance of links of a pass in which rays are as many as usual: that of the first close look toward an error of 0.05.
 const USUAL: f32 = 0.16;
-/// More is not worth the while: passes that go on in vain would take the longer. With 16 a room into which a lamp without extent shines
-/// through a small window took minutes.
-const MOST: f32 = 2.5;
+/// More effort takes more time than what it brings is worth.
+pub(crate) const MOST: f32 = 16.0;
 
-/// How many times finer than usual a pass of some tolerance is to know what rays find; where all is looked at, whatever it brings
-/// (a tolerance of nothing), as usual.
-pub(crate) fn effort(tolerance: f32) -> f32 {
-    if tolerance > 0.0 { (USUAL / tolerance).clamp(1.0, MOST) } else { 1.0 }
+/// What a pass is held to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Aim {
+    /// Relative error that its links may have, if it all comes to the worst.
+    pub(crate) tolerance: f32,
+    /// How many times finer than usual what rays find is to be known, 1 to [`MOST`].
+    pub(crate) effort: f32,
+}
+
+impl Aim {
+    /// Rays as links ask for; where all is looked at, whatever it brings (a tolerance of nothing), as usual.
+    pub(crate) fn of(tolerance: f32) -> Self {
+        let effort = if tolerance > 0.0 { (USUAL / tolerance).clamp(1.0, MOST) } else { 1.0 };
+        Self { tolerance, effort }
+    }
+}
+
+impl Default for Aim {
+    fn default() -> Self {
+        Self::of(0.0)
+    }
 }
 
 #[cfg(test)]
@@ -21,6 +37,7 @@ mod tests {
 
     #[test]
     fn who_asks_for_less_error_gets_more_rays() {
+        let effort = |tolerance| Aim::of(tolerance).effort;
         assert_eq!([1.0, USUAL, 0.0].map(effort), [1.0; 3]);
         assert!((effort(0.5 * USUAL) - 2.0).abs() < 1e-6);
         assert_eq!(effort(1e-6), MOST);

@@ -2,6 +2,7 @@
 
 use crate::Rgb;
 use crate::calibrate::{Expected, calibrate};
+use crate::effort::Aim;
 use crate::faint::Grazing;
 use crate::hierarchy::{Elements, Kind};
 use crate::hooks::{LightField, NodeId, Transfer};
@@ -98,15 +99,15 @@ impl Gather {
     pub(crate) fn new<L: LightField>(
         light: Light<'_, L>,
         links: &Links,
-        error: Option<f32>,
+        aim: Option<Aim>,
         (room, known): (u64, Option<&KeptWeights>),
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
-        let push = Push::new(light, links, error, (room, known), watch);
+        let push = Push::new(light, links, aim, (room, known), watch);
         let emitted = light.emitted_power();
         let groups = by_link(links, &push.spreads, |link, spread| Group::of_link(light, &emitted, link, spread));
         let mut gather = Self { groups, push, ..Self::default() };
-        gather.balance(light, links, error.is_some());
+        gather.balance(light, links, aim.is_some());
         gather
     }
 
@@ -151,22 +152,24 @@ impl Gather {
         }
     }
 
-    /// Compares what arrives of reflected light with what rays find, so many for each place that reflects any light, and makes it so;
-    /// returns the number of rays.
+    /// The number of places that reflect any light.
+    pub(crate) fn reflecting_places<L: LightField>(&self, light: Light<'_, L>) -> usize {
+        self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count()
+    }
+
+    /// Compares what arrives of reflected light with what so many rays find, and makes it so; returns the number of rays.
     pub(crate) fn calibrate<L: LightField>(
         &mut self,
         light: Light<'_, L>,
         links: &Links,
-        rays_each: usize,
+        rays: usize,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> u64 {
         let expected = self.expected(light, links);
-        let brought = Brought::known(light, links, &self.arriving);
-        let places = self.push.places.nodes.iter().filter(|&&place| light.element(place).importance > 0.0).count();
+        // Of what is diffuse rays all over the hemisphere know as much.
+        let brought = if light.element(0).active { Brought::known(light, links, &self.arriving) } else { None };
         let reflectances = self.reflectances(light, links);
-        let Some((factors, rays)) =
-            calibrate(light, (&expected, &reflectances), brought.as_ref(), rays_each * places, watch)
-        else {
+        let Some((factors, rays)) = calibrate(light, (&expected, &reflectances), brought.as_ref(), rays, watch) else {
             return 0;
         };
         for ((row, factor), expected) in self.rows.iter_mut().zip(factors).zip(expected) {

@@ -6,6 +6,7 @@
 
 use crate::budget::Spent;
 use crate::clock::Instant;
+use crate::effort::{self, Aim};
 use crate::face_clusters::FaceClusters;
 use crate::flat::{FlatError, Reader, Writer, are_offsets, fits, is_finite};
 use crate::hierarchy::{Element, Elements, Kind, SceneData};
@@ -14,7 +15,7 @@ use crate::links::{Link, Links};
 use crate::misjudged::Misjudged;
 use crate::refine::Pair;
 use crate::reflect::{Representative, Senders};
-use crate::resume::Unfinished;
+use crate::resume::{Tried, Unfinished};
 use crate::rooms::Rooms;
 use crate::solution::Solution;
 use crate::solver::scene_by;
@@ -360,20 +361,23 @@ fn restore_links(nodes: usize, from: &mut Reader<'_>) -> Result<Links, FlatError
 
 impl Unfinished {
     fn store(&self, out: &mut Writer<'_>) -> io::Result<()> {
-        let flags = [self.in_vain, self.gained].map(|flag| f32::from(u8::from(flag)));
-        out.put(&[self.tolerance, self.found, flags[0], flags[1]])?;
+        let Tried { in_vain, gained, rays_in_vain } = self.tried;
+        let [in_vain, gained, rays_in_vain] = [in_vain, gained, rays_in_vain].map(|flag| f32::from(u8::from(flag)));
+        out.put(&[self.aim.tolerance, self.aim.effort, self.found, in_vain, gained, rays_in_vain])?;
         out.put(&self.unlit)?;
         out.put(&self.coarse)
     }
 
     fn restore(nodes: usize, from: &mut Reader<'_>) -> Result<Self, FlatError> {
         const WHAT: &str = "pairs that are not done";
-        let [tolerance, found, in_vain, gained] = from.take_exactly(WHAT)?;
-        let [in_vain, gained] = [in_vain, gained].map(|flag| flag != 0.0);
-        let unfinished = Self { tolerance, found, in_vain, gained, unlit: from.take(WHAT)?, coarse: from.take(WHAT)? };
+        let [tolerance, effort, found, flags @ ..]: [f32; 6] = from.take_exactly(WHAT)?;
+        let [in_vain, gained, rays_in_vain] = flags.map(|flag| flag != 0.0);
+        let (aim, tried) = (Aim { tolerance, effort }, Tried { in_vain, gained, rays_in_vain });
+        let unfinished = Self { aim, found, tried, unlit: from.take(WHAT)?, coarse: from.take(WHAT)? };
         let is_sound = |pair: &Pair| (pair.receiver as usize) < nodes && (pair.sender as usize) < nodes;
         let pairs = unfinished.unlit.iter().chain(&unfinished.coarse).all(is_sound);
-        fits(pairs && tolerance > 0.0 && found >= 0.0, WHAT)?;
+        let is_aim = tolerance > 0.0 && (1.0..=effort::MOST).contains(&effort);
+        fits(pairs && is_aim && found >= 0.0, WHAT)?;
         Ok(unfinished)
     }
 }

@@ -8,7 +8,7 @@
 
 use crate::NodeId;
 use crate::all_over::{Points, Spots};
-use crate::effort::effort;
+use crate::effort::Aim;
 use crate::gather::{GROUPS, Group, share};
 use crate::hierarchy::{Element, Elements, GRAFT, Kind, SceneData};
 use crate::hooks::{Hierarchy, LightField};
@@ -99,8 +99,8 @@ pub(crate) struct Push {
     pub(crate) places: Places,
     /// By link.
     pub(crate) spreads: Vec<Spread>,
-    /// Relative error of the solution.
-    error: f32,
+    /// What the solution is held to.
+    aim: Aim,
     /// By link: what it brings if it is wholly visible, where it is looked at closely (sum of channels).
     means: Vec<f32>,
     /// Links that would be looked at closely if they brought more.
@@ -123,23 +123,23 @@ pub(crate) struct Push {
 }
 
 impl Push {
-    /// Finds the places and their weights but for those `known`, for a solution with the given relative error; where there is none,
+    /// Finds the places and their weights but for those `known`, for a solution held to this; where it is to none,
     /// and where `watch` breaks, by orientation and distance alone. The weights that are kept take no more than `room` bytes.
     pub(crate) fn new<L: LightField>(
         light: Light<'_, L>,
         links: &Links,
-        error: Option<f32>,
+        aim: Option<Aim>,
         (room, known): (u64, Option<&KeptWeights>),
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
-        let (spreads, means) = spreads(light, links, error);
+        let (spreads, means) = spreads(light, links, aim);
         let all_light = light.exitant.irradiance[0].element_sum();
-        let edges = error.map(|error| Edges { means: &means, least: EDGE_SHARE * error * all_light });
+        let edges = aim.map(|aim| Edges { means: &means, least: EDGE_SHARE * aim.tolerance * all_light });
         let (places, found_by) = Places::new(light, links, edges);
         let mut push = Self {
             places,
             spreads,
-            error: error.unwrap_or_default(),
+            aim: aim.unwrap_or_default(),
             means,
             faint_links: 0,
             spared_looks: 0,
@@ -150,7 +150,7 @@ impl Push {
             weighted: Vec::new(),
             first_weighted: vec![0],
         };
-        if error.is_some() {
+        if aim.is_some() {
             let faint =
                 |(link, spread): &(&Link, &Spread)| **spread != Spread::Exact && is_shared(light, link.receiver);
             push.faint_links = links.all().iter().zip(&push.spreads).filter(faint).count() as u64;
@@ -175,15 +175,15 @@ impl Push {
         }
         let mut weights = vec![0.0; push.first[push.first.len() - 1]];
         let mut parts = by_place(&mut weights, &push.first, &push.places.nodes);
-        let chunk = if error.is_some() { BETWEEN_WATCHES * threads::current_num_threads() } else { parts.len().max(1) };
+        let chunk = if aim.is_some() { BETWEEN_WATCHES * threads::current_num_threads() } else { parts.len().max(1) };
         push.rays = found_by;
         let look = match known {
             Some(known) => Look::Beyond(known),
-            None if error.is_none() => Look::Roughly,
+            None if aim.is_none() => Look::Roughly,
             None => Look::Closely,
         };
         for part in parts.chunks_mut(chunk) {
-            if error.is_some() && watch().is_break() {
+            if aim.is_some() && watch().is_break() {
                 return Self::new(light, links, None, (room, None), watch);
             }
             for looked in threads::map_mut(part, 4, |_, part| push.find(light, links, part, look)) {
@@ -204,7 +204,7 @@ impl Push {
         (node, weights): &mut (u32, &mut [f32]),
         look: Look<'_>,
     ) -> Looked {
-        let place = Place::new(light, *node, self.places.middle(light.elements, *node), self.error);
+        let place = Place::new(light, *node, self.places.middle(light.elements, *node), self.aim);
         let mut slots = weights.chunks_exact_mut(numbers(light, *node));
         let mut looked = Looked::default();
         let mut known = if let Look::Beyond(known) = look { Some(known.of(light.elements, *node)) } else { None };
@@ -253,7 +253,7 @@ impl Push {
             chances += outlook.chance.unwrap_or_default();
             above.push((at, outlook));
         });
-        (above, (LOOKS / (self.error.sqrt() * chances)).min(1.0))
+        (above, (LOOKS / (self.aim.tolerance.sqrt() * chances)).min(1.0))
     }
 
     /// Places have the ids that they have after [`Elements::graft`].
@@ -317,7 +317,7 @@ impl Push {
 
     /// The same with the place itself.
     fn each<L: LightField>(&self, light: Light<'_, L>, node: u32, mut visit: impl FnMut(&Place, usize)) {
-        let place = Place::new(light, node, self.places.middle(light.elements, node), self.error);
+        let place = Place::new(light, node, self.places.middle(light.elements, node), self.aim);
         self.weighted_above(light.elements, node, |at| visit(&place, at));
     }
 
@@ -402,14 +402,10 @@ pub(crate) fn is_shared<L: LightField>(light: Light<'_, L>, node: u32) -> bool {
 }
 
 /// By link, how its light is to be spread, and what it brings if it is wholly visible.
-pub(crate) fn spreads<L: LightField>(
-    light: Light<'_, L>,
-    links: &Links,
-    error: Option<f32>,
-) -> (Vec<Spread>, Vec<f32>) {
+pub(crate) fn spreads<L: LightField>(light: Light<'_, L>, links: &Links, aim: Option<Aim>) -> (Vec<Spread>, Vec<f32>) {
     let mut means = vec![0.0; links.all().len()];
     let spreads = threads::map_mut(&mut means, 256, |at, mean| {
-        let (spread, brings) = spread(light, &links.all()[at], error);
+        let (spread, brings) = spread(light, &links.all()[at], aim);
         *mean = brings;
         spread
     });
@@ -417,25 +413,25 @@ pub(crate) fn spreads<L: LightField>(
 }
 
 /// Those of a link.
-fn spread<L: LightField>(light: Light<'_, L>, link: &Link, error: Option<f32>) -> (Spread, f32) {
+fn spread<L: LightField>(light: Light<'_, L>, link: &Link, aim: Option<Aim>) -> (Spread, f32) {
     let receiver = light.element(link.receiver);
     let even = if receiver.is_flat() || link.visibility == 0.0 { Spread::Even } else { Spread::Plain };
     let mean = light.emitted_toward(link).element_sum() * link.factor;
-    let least = match (is_shared(light, link.receiver), error) {
-        (true, error) => faint_share(error.unwrap_or(1.0)),
+    let least = match (is_shared(light, link.receiver), aim) {
+        (true, aim) => faint_share(aim.unwrap_or(Aim::of(1.0))),
         (false, Some(_)) if link.visibility >= 0.0 => OWN_SHARE,
         // Nothing is left to be found out, or nobody looks.
         (false, _) => f32::INFINITY,
     };
-    let may_be_visible = if error.is_some() { may_be_visible(link) } else { link.visibility.abs() };
+    let may_be_visible = if aim.is_some() { may_be_visible(link) } else { link.visibility.abs() };
     let irradiance = light.exitant.irradiance[link.receiver as usize].element_sum();
     let closely = mean > 0.0 && irradiance > 0.0 && mean * may_be_visible >= least * irradiance;
     (if closely { Spread::Exact } else { even }, mean)
 }
 
 /// Links that bring a leaf less than this share of its light are not looked at closely.
-fn faint_share(error: f32) -> f32 {
-    FAINT_SHARE * error.sqrt() / effort(error)
+fn faint_share(aim: Aim) -> f32 {
+    FAINT_SHARE * aim.tolerance.sqrt() / aim.effort
 }
 
 /// What a link may let through, for all that is known without a look.
@@ -566,19 +562,19 @@ struct Place {
 }
 
 impl Place {
-    fn new<L: LightField>(light: Light<'_, L>, node: u32, middle: Vec3, error: f32) -> Self {
+    fn new<L: LightField>(light: Light<'_, L>, node: u32, middle: Vec3, aim: Aim) -> Self {
         let element = light.element(node);
         let irradiance = light.exitant.irradiance[node as usize];
         Self {
             node,
             middle: (middle, element.normals.axis, 1.0),
             points: points_of(light, node),
-            much: MUCH_SHARE * error.sqrt() * irradiance.element_sum(),
-            negligible: negligible(irradiance, error),
-            faint: faint_share(error) * irradiance.element_sum(),
-            effort: effort(error),
-            uneven: UNEVEN_SHARE * error * irradiance.element_sum(),
-            sure: SURE_SHARE * error.sqrt() * irradiance.element_sum(),
+            much: MUCH_SHARE * aim.tolerance.sqrt() * irradiance.element_sum(),
+            negligible: negligible(irradiance, aim.tolerance),
+            faint: faint_share(aim) * irradiance.element_sum(),
+            effort: aim.effort,
+            uneven: UNEVEN_SHARE * aim.tolerance * irradiance.element_sum(),
+            sure: SURE_SHARE * aim.tolerance.sqrt() * irradiance.element_sum(),
         }
     }
 

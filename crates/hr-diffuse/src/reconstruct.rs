@@ -5,6 +5,7 @@
 
 use crate::calibrate::{OF_VERTICES, Sums, factors};
 use crate::contacts::Contacts;
+use crate::effort::Aim;
 use crate::footprint::{Footprint, footprint};
 use crate::gather::{Group, carried, share};
 use crate::hidden::Hidden;
@@ -92,7 +93,7 @@ pub(crate) fn reconstruct<L: LightField>(
     let mut covered = Vec::with_capacity(count);
     let mut sights = Vec::new();
     let shares = light.reflected_shares();
-    let (spreads, _) = spreads(light, links, Some(error));
+    let (spreads, _) = spreads(light, links, Some(Aim::of(error)));
     let (from_afar, near) = inherited(light, (links, &spreads, &shares), (&vertices, &places, &gathers));
     for start in (0..count).step_by(chunk) {
         if watch(start as f32 / count as f32).is_break() {

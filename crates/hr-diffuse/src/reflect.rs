@@ -593,7 +593,7 @@ impl<L: LightField> Solver<L> {
     fn link_errors(&self) -> Vec<f32> {
         let is_known = self.gather.is_for(&self.links) && self.settings.transport == Transport::Gather;
         let arriving = if is_known { self.gather.arriving() } else { &[] };
-        let tolerance = self.link_error(self.unfinished.tolerance.min(1.0));
+        let tolerance = self.link_error(self.unfinished.aim.tolerance.min(1.0));
         let mut squares = vec![0.0_f32; self.elements.nodes.len()];
         for (node, element) in self.elements.nodes.iter().enumerate() {
             let most = tolerance / self.weight(node as u32).max(f32::MIN_POSITIVE);

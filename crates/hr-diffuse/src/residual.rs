@@ -29,10 +29,17 @@ const GRID: u32 = 8;
 /// Rays of one estimate toward emitters; leaves that are brighter than others get up to `MOST_BRIGHT` times as many.
 const TOWARD_EMITTERS: u32 = 32;
 const MOST_BRIGHT: f32 = 16.0;
+/// The same toward lights without extent.
+const TOWARD_LIGHTS: u32 = 16;
 
-/// Rays of one estimate toward what links say that reflected light comes from, where an extension takes part: lobes that are narrow, or far
-/// away, are met by few rays of the grid.
+/// Rays of one estimate toward what links say that reflected light comes from: what is small, or far away, and narrow lobes are met by
+/// few rays of the grid.
 const TOWARD_SENDERS: u32 = 32;
+
+/// An error is known if its standard error is less than this share of it.
+pub(crate) const KNOWN: f32 = 0.1;
+/// Noise of more than this share of what was found makes it seem more.
+const MOST_NOISE: f32 = 0.5;
 
 /// Leaves that a thread looks from between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 32;
@@ -63,9 +70,16 @@ impl Residual {
         self.signed / (1.0 - self.indirect).max(0.05)
     }
 
-    /// Whether a relative error may be this one, for all that is known (two standard errors).
-    pub(crate) fn may_be(&self, error: f32) -> bool {
-        (self.error() - error).abs() < 2.0 * self.uncertain
+    /// Whether it tells for sure (two standard errors) that the error is no more than this one, or else by how much it is more.
+    pub(crate) fn tells(&self, error: f32) -> bool {
+        let (found, doubt) = (self.error(), 2.0 * self.uncertain);
+        found + doubt <= error || found - doubt > error && self.uncertain < KNOWN * found && !self.is_noisy()
+    }
+
+    /// Whether what was found may owe much to the rays' own noise: where few rays find much and most find nothing, that is not all that is
+    /// taken off.
+    pub(crate) fn is_noisy(&self) -> bool {
+        self.noise > MOST_NOISE * self.absolute
     }
 
     /// Relative L1 error of the solution: what has one sign is repeated by each bounce, the rest averages out.
@@ -99,8 +113,7 @@ pub(crate) struct Look {
 impl Look {
     /// Four times as many rays, where they tell the most: each leaf's own, or those of more leaves.
     pub(crate) fn closer(self, found: &Residual) -> Self {
-        let is_noise = found.noise > found.absolute;
-        if is_noise { Self { finer: 2 * self.finer, ..self } } else { Self { leaves: 4 * self.leaves, ..self } }
+        if found.is_noisy() { Self { finer: 2 * self.finer, ..self } } else { Self { leaves: 4 * self.leaves, ..self } }
     }
 }
 
@@ -309,7 +322,7 @@ impl Place<'_> {
         let mut found = Found { estimates: [0.0; 2], direct: 0.0, solution, rays: 0 };
         for half in 0..2 {
             let seed = hash(seed, 0x77 + half);
-            let (lights, shot) = from_lights(light, emitters, leaf, seed);
+            let (lights, shot) = from_lights(light, emitters, leaf, (seed, TOWARD_LIGHTS * finer * finer));
             let (surfaces, also) = from_emitters(light, emitters, leaf, (seed, count));
             found.direct += 0.5 * (lights + surfaces);
             let (reflected, looked) = match &self.senders {
@@ -323,23 +336,32 @@ impl Place<'_> {
     }
 }
 
-/// Irradiance by lights without extent at a random point, and the rays shot for it.
-fn from_lights<L: LightField>(light: Light<'_, L>, emitters: &Emitters, leaf: u32, seed: u32) -> (f32, u32) {
+/// Mean irradiance by lights without extent, from `count` rays toward all of them, at least one toward each, and the number that was
+/// shot.
+fn from_lights<L: LightField>(
+    light: Light<'_, L>,
+    emitters: &Emitters,
+    leaf: u32,
+    (seed, count): (u32, u32),
+) -> (f32, u32) {
     let surface = light.element(leaf).source;
-    let (mut sum, mut rays) = (0.0, 0);
+    let each = count.div_ceil(emitters.lights.len().max(1) as u32);
+    let (mut sum, mut rays, mut blocker) = (0.0, 0, NO_BLOCKER);
     for &node in &emitters.lights {
-        let u = point4(hash(seed, node), 0);
-        let (x, n, _) = point(light, leaf, Vec2::new(u.x, u.y));
         let index = light.element(node).source as usize;
-        let (to, cosine) = light_segment(light.scene, index, x, n);
-        let irradiance = light.scene.lights[index].intensity.element_sum() * light.factor_at(x, n, node);
-        if cosine > 0.0 && irradiance > 0.0 {
-            rays += 1;
-            let hidden = light.scene.visibility.occluded(x, to, [surface, u32::MAX], &mut NO_BLOCKER.clone());
-            sum += if hidden { 0.0 } else { irradiance };
+        for ray in 0..each {
+            let u = point4(hash(seed, node), ray);
+            let (x, n, _) = point(light, leaf, Vec2::new(u.x, u.y));
+            let (to, cosine) = light_segment(light.scene, index, x, n);
+            let irradiance = light.scene.lights[index].intensity.element_sum() * light.factor_at(x, n, node);
+            if cosine > 0.0 && irradiance > 0.0 {
+                rays += 1;
+                let hidden = light.scene.visibility.occluded(x, to, [surface, u32::MAX], &mut blocker);
+                sum += if hidden { 0.0 } else { irradiance };
+            }
         }
     }
-    (sum, rays)
+    (sum / each as f32, rays)
 }
 
 /// Mean irradiance by emitted light, from `count` rays toward random points, and the number that was shot.
@@ -461,12 +483,14 @@ mod tests {
     use glam::DVec3;
 
     #[test]
-    fn errors_are_unclear_within_two_standard_errors() {
+    fn errors_are_clear_that_are_known_or_small() {
         let found = |absolute, uncertain| Residual { absolute, uncertain, ..Residual::default() };
-        assert!(found(0.09, 0.01).may_be(0.1) && found(0.11, 0.01).may_be(0.1));
-        assert!(!found(0.05, 0.01).may_be(0.1), "it is fine for sure");
-        assert!(!found(0.2, 0.04).may_be(0.1), "it is not for sure");
-        assert!(!found(0.09, 0.001).may_be(0.1), "it is known well");
+        assert!(!found(0.09, 0.01).tells(0.1) && !found(0.11, 0.01).tells(0.1));
+        assert!(found(0.05, 0.02).tells(0.1), "it is fine for sure");
+        assert!(!found(0.2, 0.04).tells(0.1), "it is not for sure, but by how much?");
+        assert!(found(0.09, 0.001).tells(0.1) && found(0.2, 0.01).tells(0.1), "it is known well");
+        let noisy = Residual { noise: 0.2, ..found(0.2, 0.001) };
+        assert!(!noisy.tells(0.1) && noisy.tells(0.3), "noise makes it seem more, not less");
     }
 
     #[test]
@@ -510,7 +534,7 @@ mod tests {
 
     fn solved(surfaces: Vec<Surface>, materials: Vec<DiffuseMaterial>) -> Solver {
         let input = SceneInput { surfaces, materials, ..SceneInput::default() };
-        let mut solver = Solver::new(&input, Settings::with_error(0.018), ()).expect("the room is sound");
+        let mut solver = Solver::new(&input, Settings::with_error(0.01), ()).expect("the room is sound");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         solver
     }

@@ -11,6 +11,7 @@ use crate::budget::{Account, Spent};
 use crate::clock::Instant;
 use crate::contact_shadows;
 use crate::convergence::Convergence;
+use crate::effort::Aim;
 use crate::error::SolveError;
 use crate::exposed::expose;
 use crate::faint::sorted;
@@ -25,7 +26,7 @@ use crate::misjudged::Misjudged;
 use crate::refine::{MutableLight, Pair, Tolerance, refine};
 use crate::reflect::{Reflect, Senders};
 use crate::relight::Linked;
-use crate::resume::{Unfinished, is_worth};
+use crate::resume::{Tried, Unfinished, is_worth};
 use crate::sent::Sent;
 use crate::shadows;
 use crate::shooting::Shot;
@@ -207,17 +208,20 @@ impl<L: LightField> Solver<L> {
             self.unfinished.renew(&mut self.links, self.elements.nodes.len());
         }
         let (mut is_left, mut goes_on) = (false, None);
-        while let Some(tolerance) = self.unfinished.next(&self.settings) {
-            let (reflects, closely) = is_worth(tolerance, self.settings.tolerance());
-            let pass = Pass { number: self.passes, tolerance, reflects, closely };
-            self.refine(pass, &mut stopped, watch);
+        while let Some(aim) = self.unfinished.next(&self.settings) {
+            let (reflects, closely) = is_worth(aim.tolerance, self.settings.tolerance());
+            let pass = Pass { number: self.passes, aim, reflects, closely };
+            if !self.unfinished.is_fine_enough(aim) {
+                self.refine(pass, &mut stopped, watch);
+            }
             if stopped {
                 // New elements have their parents' light.
                 break;
             }
             let late = self.stats.spent == Some(Spent::Time);
-            // Once time is spent there is no later pass to look closely in.
-            let last = Pass { reflects: true, closely: true, tolerance: self.settings.tolerance(), ..pass };
+            // Once time is spent there is no later pass to look closely in, and none for more rays than usual.
+            let tolerance = self.settings.tolerance();
+            let last = Pass { reflects: true, closely: true, aim: Aim { tolerance, effort: 1.0 }, ..pass };
             let pass = if late { last } else { pass };
             self.prepare_watched(pass, &mut stopped, watch);
             self.settle(pass, &mut stopped, watch);
@@ -229,12 +233,12 @@ impl<L: LightField> Solver<L> {
             self.measure();
             if self.stats.spent.is_some() {
                 // What is left to be done begins here; passes that refine nothing still link what light comes to.
-                goes_on.get_or_insert((self.unfinished.tolerance, self.unfinished.found));
+                goes_on.get_or_insert((self.unfinished.aim, self.unfinished.found));
             }
             if stopped || late || self.stats.spent.is_some() && pass.closely {
                 break;
             }
-            self.unfinished.done(tolerance, found.as_ref());
+            self.unfinished.done(aim, found.as_ref());
             self.passes += 1;
             // Where a budget is spent light settles first.
             if self.stats.spent.is_none() {
@@ -246,8 +250,8 @@ impl<L: LightField> Solver<L> {
             self.passes = 0;
         }
         if let Some(before) = goes_on {
-            (self.unfinished.tolerance, self.unfinished.found) = before;
-            (self.unfinished.in_vain, self.unfinished.gained) = (false, false);
+            (self.unfinished.aim, self.unfinished.found) = before;
+            self.unfinished.tried = Tried::default();
         }
         if self.stats.iterations == 0 {
             // Whenever it was stopped, there is some light.
@@ -269,7 +273,7 @@ impl<L: LightField> Solver<L> {
     fn prepare_watched(&mut self, pass: Pass, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
         let account = self.account;
         let progress = self.progress(Phase::Transport, pass.fraction(0.6));
-        self.prepare(pass.closely.then_some(pass.tolerance), &mut || {
+        self.prepare(pass.closely.then_some(pass.aim), &mut || {
             *stopped = *stopped || watch(&progress).is_break();
             if *stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
@@ -283,10 +287,10 @@ impl<L: LightField> Solver<L> {
         self.stats.residuals.clear();
         self.restart();
         self.pull();
-        let (mut stopped, tolerance) = (false, self.unfinished.tolerance);
-        if tolerance.is_finite() {
-            let (reflects, _) = is_worth(tolerance, self.settings.tolerance());
-            let pass = Pass { number: 0, tolerance, reflects, closely: false };
+        let (mut stopped, aim) = (false, self.unfinished.aim);
+        if aim.tolerance.is_finite() {
+            let (reflects, _) = is_worth(aim.tolerance, self.settings.tolerance());
+            let pass = Pass { number: 0, aim, reflects, closely: false };
             let kept = self.links.take();
             self.refine(pass, &mut stopped, watch);
             self.links = Links::new([kept, self.links.take()].concat(), self.elements.nodes.len());
@@ -341,8 +345,8 @@ impl<L: LightField> Solver<L> {
             self.exitant.adaptation = adaptation(self.light(), &self.gather, &self.links);
         }
         let tolerance = Tolerance {
-            error: self.link_error(pass.tolerance),
-            lost: self.link_error(self.settings.tolerance().min(pass.tolerance)),
+            error: self.link_error(pass.aim.tolerance),
+            lost: self.link_error(self.settings.tolerance().min(pass.aim.tolerance)),
             shadow: if pass.closely || self.edges_known {
                 SHADOW_SHARE * self.settings.tolerance() * self.mean_irradiance()
             } else {
@@ -350,7 +354,7 @@ impl<L: LightField> Solver<L> {
             },
             kept_too: !self.edges_known,
             dark: self.stats.iterations > 0 && self.exitant.irradiance[0] == Rgb::ZERO,
-            smallest: SMALLEST_SHARE * pass.tolerance.sqrt() * self.elements.rooms.size,
+            smallest: SMALLEST_SHARE * pass.aim.tolerance.sqrt() * self.elements.rooms.size,
             skips: self.skips,
         };
         let error = self.believed_error();
@@ -426,17 +430,18 @@ impl<L: LightField> Solver<L> {
 
     /// Finds out how the light of each link reaches the leaves below its receiver: where a tolerance is given, by a look from each
     /// leaf itself.
-    pub(crate) fn prepare(&mut self, tolerance: Option<f32>, watch: &mut dyn FnMut() -> ControlFlow<()>) {
+    pub(crate) fn prepare(&mut self, aim: Option<Aim>, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         let start = Instant::now();
         self.shown.clear();
-        let error = tolerance.map(|tolerance| if self.skips.faint_links { tolerance } else { 0.0 });
+        let skips = self.skips;
+        let looks = aim.map(|aim| if skips.faint_links { aim } else { Aim { tolerance: 0.0, ..aim } });
         let room = self.account.room::<L>(self.elements.nodes.len() as u64, self.links.all().len() as u64);
-        let known = tolerance.and_then(|_| self.kept_weights.take());
+        let known = aim.and_then(|_| self.kept_weights.take());
         let known = known.map(|known| known.with_light(&self.elements, &self.exitant));
-        self.gather = Gather::new(self.light(), &self.links, error, (room, known.as_ref()), watch);
+        self.gather = Gather::new(self.light(), &self.links, looks, (room, known.as_ref()), watch);
         self.kept_weights = known.and_then(KeptWeights::once_more);
         self.weighed_by = LightThen::new(&self.exitant);
-        self.prepared = tolerance.is_some();
+        self.prepared = aim.is_some();
         self.stats.rays += self.gather.rays();
         self.stats.skipped.faint_links = self.gather.faint_links();
         self.stats.skipped.spared_looks += self.gather.spared_looks();
@@ -499,8 +504,8 @@ impl<L: LightField> Solver<L> {
 struct Pass {
     /// Passes before it.
     number: usize,
-    /// Relative error that its links may have, if it all comes to the worst.
-    tolerance: f32,
+    /// What it is held to.
+    aim: Aim,
     /// Whether the extension's light is reflected.
     reflects: bool,
     /// Whether leaves look for themselves what arrives from where, and light settles.

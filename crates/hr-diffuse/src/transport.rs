@@ -16,6 +16,8 @@ use std::f32::consts::PI;
 /// at a point; else its children are.
 const CLUSTER_FAR: f32 = 0.25;
 
+/// No part of a node is so many times brighter than the leaves that stand for it.
+const MOST_TIMES: f32 = 1e4;
 /// Senders that bring no more than this share of a place's irradiance, times the square root of the tolerance, are negligible there.
 const NEGLIGIBLE_SHARE: f32 = 0.065;
 /// That they do is taken to be so where their directional light would bring no more with so many times its mean over all directions: a
@@ -185,6 +187,9 @@ impl<L: LightField> Light<'_, L> {
                 light += radiance(leaf) * strength * (cosine * share * PI);
             }
         }
+        if state != sender {
+            light *= self.times_as_much(sender, state);
+        }
         // Intensity per area over the mean cosine is mean radiance; near the terminator both fade.
         match (holder.is_flat(), element.kind == Kind::Cluster) {
             (true, false) => light,
@@ -193,6 +198,16 @@ impl<L: LightField> Light<'_, L> {
             (true, true) => light * element.mean_cosine(away),
             (false, true) => light * (element.mean_cosine(away) / holder.mean_cosine(away).max(0.05)),
         }
+    }
+
+    /// How many times as much directional light a part of a node sends as the leaves that stand for the node, by channel: as many as they
+    /// reflect. Without it what lies in the dark would shine as the rest of it does.
+    fn times_as_much(&self, part: u32, node: u32) -> Rgb {
+        let reflects = |node: u32| self.exitant.directional[node as usize];
+        let standing: Rgb = self.exitant.senders.of(node).iter().map(|of| reflects(of.leaf) * of.share).sum();
+        // Where they are dark there is nothing to multiply.
+        let times = (reflects(part) / standing).min(Rgb::splat(MOST_TIMES));
+        Rgb::select(standing.cmpgt(Rgb::ZERO), times, Rgb::ONE)
     }
 
     /// Smallest and largest [`emitted`](Self::emitted) over a cone of directions away from the sender, for nodes
@@ -457,7 +472,8 @@ impl<L: LightField> Light<'_, L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::skips::tests::Echo;
+    use crate::skips::Skips;
+    use crate::skips::tests::{Echo, room, solve};
     use crate::{DiffuseMaterial, SceneInput, Settings, Shape, Solver, Surface};
     use glam::DVec3;
     use std::ops::ControlFlow;
@@ -594,5 +610,31 @@ mod tests {
             let is_metal = solver.elements.nodes[leaf as usize].material == 0;
             assert_eq!(shares[leaf as usize], f32::from(u8::from(is_metal)), "of leaf {leaf}");
         }
+    }
+
+    /// Leaves that nobody asks about by themselves send what those send that stand for all of the surface, in proportion to what they reflect.
+    #[test]
+    fn what_lies_in_the_dark_does_not_shine_as_the_rest_does() {
+        let field = Echo { material: 0, albedo: 0.5, errs: false };
+        let mut solver = solve(&room(), 0.1, field, Skips::ALL);
+        let light = solver.light();
+        let is_spoken_for = |&leaf: &u32| {
+            let state = light.exitant.reflected_as[leaf as usize];
+            let stands = light.exitant.senders.of(state).iter().any(|of| of.leaf == leaf);
+            light.element(leaf).active && light.element(state).is_patch() && !stands
+        };
+        let leaf = solver.elements.patch_leaves().find(is_spoken_for).expect("some leaves stand for others");
+        let state = solver.exitant.reflected_as[leaf as usize];
+        let away = solver.elements.nodes[leaf as usize].normals.axis;
+        let of = |solver: &Solver<Echo>| [leaf, state].map(|node| solver.light().directional(node, away).x);
+        let standing = solver.exitant.senders.of(state).to_vec();
+        standing.iter().for_each(|of| solver.exitant.directional[of.leaf as usize] = Rgb::splat(4.0));
+        solver.exitant.directional[leaf as usize] = Rgb::ONE;
+        let [part, whole] = of(&solver);
+        assert!(whole > 0.0 && (part - 0.25 * whole).abs() < 1e-5 * whole, "{part}, {whole}");
+        solver.exitant.directional[leaf as usize] = Rgb::ZERO;
+        assert_eq!(of(&solver), [0.0, whole], "it lies in the dark");
+        solver.exitant.directional.fill(Rgb::ZERO);
+        assert_eq!(of(&solver), [whole; 2], "nothing is known of either");
     }
 }

@@ -43,7 +43,7 @@ impl Push {
         });
         let is_stale = |index: usize| {
             let node = self.places.nodes[index];
-            let place = Place::new(light, node, self.places.middle(light.elements, node), self.error);
+            let place = Place::new(light, node, self.places.middle(light.elements, node), self.aim);
             let irradiance = light.exitant.irradiance[node as usize].element_sum();
             let mut missing = 0.0;
             self.each_weight(light, links, index, |at, weight| {

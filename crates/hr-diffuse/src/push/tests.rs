@@ -1,4 +1,5 @@
 use super::{FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, Place, Push, Spread, is_shared, visible};
+use crate::effort::Aim;
 use crate::gather::{GROUPS, Group};
 use crate::links::{Link, Links};
 use crate::sampling::{hash, unit};
@@ -19,7 +20,7 @@ fn link_share(link: &Link, spread: Spread) -> f32 {
 fn weights_are_means_over_the_receiver() {
     let solver = solve(&room(), 0.3 * ERROR, (), Skips::ALL);
     let (light, links) = (solver.light(), &solver.links);
-    let push = Push::new(light, links, Some(ERROR), (u64::MAX, None), &mut || ControlFlow::Continue(()));
+    let push = Push::new(light, links, Some(Aim::of(ERROR)), (u64::MAX, None), &mut || ControlFlow::Continue(()));
     // By link: weight × area of the leaves below, and their area.
     let mut below = vec![[0.0_f64; 2]; links.all().len()];
     for (index, &leaf) in push.places.nodes.iter().enumerate() {
@@ -66,14 +67,14 @@ fn looks_that_are_spared_are_made_up_for() {
     let surfaces = std::iter::once(lamp).chain((0..120).map(ball)).collect();
     let solver = solve(&SceneInput { surfaces, materials, ..SceneInput::default() }, ERROR, (), Skips::ALL);
     let (light, links) = (solver.light(), &solver.links);
-    let of = |error| Push::new(light, links, Some(error), (u64::MAX, None), &mut || ControlFlow::Continue(()));
+    let of = |error| Push::new(light, links, Some(Aim::of(error)), (u64::MAX, None), &mut || ControlFlow::Continue(()));
     let (some, all) = (of(ERROR), of(0.0));
     assert_eq!(all.spared_looks, 0, "all is looked at");
     let looks = some.weights.len() as u64;
     assert!(10 * some.spared_looks > looks, "{} of {looks} are spared", some.spared_looks);
     // Many places would draw more looks than they may: theirs are made rarer.
     let are_rarer = |&&node: &&u32| {
-        let place = Place::new(light, node, some.places.middle(light.elements, node), ERROR);
+        let place = Place::new(light, node, some.places.middle(light.elements, node), Aim::of(ERROR));
         some.outlooks(light, links, &place).1 < 1.0
     };
     let many = some.places.nodes.iter().filter(are_rarer).count();
@@ -102,7 +103,7 @@ fn looks_that_are_spared_are_made_up_for() {
 fn weights_that_are_not_kept_are_found_again() {
     let solver = solve(&room(), ERROR, (), Skips::ALL);
     let (light, links) = (solver.light(), &solver.links);
-    let of = |room: u64| Push::new(light, links, Some(ERROR), (room, None), &mut || ControlFlow::Continue(()));
+    let of = |room: u64| Push::new(light, links, Some(Aim::of(ERROR)), (room, None), &mut || ControlFlow::Continue(()));
     let (all, none) = (of(u64::MAX), of(0));
     assert_eq!((none.weight_bytes(), all.weight_bytes() > 10_000), (0, true), "bytes that are kept");
     let groups = vec![Group::Rest; links.all().len()];
@@ -124,7 +125,7 @@ fn links_that_look_blocked_lose_nothing() {
     let solver = solve(&room(), ERROR, (), Skips::ALL);
     let light = solver.light();
     let watch = &mut || ControlFlow::Continue(());
-    let spreads = Push::new(light, &solver.links, Some(FINE), (0, None), watch).spreads;
+    let spreads = Push::new(light, &solver.links, Some(Aim::of(FINE)), (0, None), watch).spreads;
     // Links that still matter with the least that is taken to be visible.
     let blocked = |(link, spread): (&Link, &Spread)| {
         let partial = link.visibility > 0.1 && link.visibility < 1.0;
@@ -141,7 +142,7 @@ fn links_that_look_blocked_lose_nothing() {
     let brought = |visibility: fn(f32) -> f32| {
         let links = chosen.iter().map(|link| Link { visibility: visibility(link.visibility), ..*link }).collect();
         let links = Links::new(links, nodes);
-        let push = Push::new(light, &links, Some(FINE), (u64::MAX, None), &mut || ControlFlow::Continue(()));
+        let push = Push::new(light, &links, Some(Aim::of(FINE)), (u64::MAX, None), &mut || ControlFlow::Continue(()));
         let carries = |(link, spread): (&Link, &Spread)| {
             light.emitted(link.sender, Vec3::Z).element_sum() * link_share(link, *spread)
         };

@@ -21,10 +21,9 @@ pub(crate) struct Brought<'a> {
 }
 
 impl<'a> Brought<'a> {
-    /// Where an extension takes part, and what arrives is known by link.
+    /// Where what arrives is known by link.
     pub(crate) fn known<L: LightField>(light: Light<'_, L>, links: &'a Links, arriving: &'a [Rgb]) -> Option<Self> {
-        let is_known = light.element(0).active && arriving.len() == links.all().len();
-        is_known.then(|| Self { links, arriving, shares: light.reflected_shares() })
+        (arriving.len() == links.all().len()).then(|| Self { links, arriving, shares: light.reflected_shares() })
     }
 }
 

@@ -1,4 +1,5 @@
 use super::Skips;
+use crate::effort::Aim;
 use crate::hooks::{Arrived, Hierarchy, LightField, NodeId, Transfer};
 use crate::links::{Link, Links};
 use crate::refine::Pair;
@@ -96,7 +97,7 @@ fn senders_that_stay_dark_change_nothing() {
     let links = without.links.all().iter().copied().chain(without.unfinished.unlit.iter().map(link)).collect();
     without.links = Links::new(links, without.elements.nodes.len());
     for solver in [&mut with, &mut without] {
-        solver.prepare(Some(solver.settings.tolerance()), &mut || ControlFlow::Continue(()));
+        solver.prepare(Some(Aim::of(solver.settings.tolerance())), &mut || ControlFlow::Continue(()));
         assert!(solver.iterate(Reflect::Reshaped, &mut || ControlFlow::Continue(())).is_some(), "nobody stops it");
     }
     assert_same(&with, &without, 0.0);

@@ -3,7 +3,7 @@
 use super::{Pass, Phase, Progress, Solver, Transport};
 use crate::Rgb;
 use crate::clock::Instant;
-use crate::effort::effort;
+use crate::effort::Aim;
 use crate::hooks::LightField;
 use crate::misjudged::Misjudged;
 use crate::reflect::Reflect;
@@ -25,12 +25,16 @@ const FEW_ITERATIONS: u32 = 3;
 const MOST_FOLLOWED: usize = 4;
 /// … where more than this times the pass's tolerance of all light waits.
 const FOLLOWED_SHARE: f32 = 0.1;
-/// So many rays for each place, of the usual [effort](crate::effort), are worth knowing how much reflected light links should bring.
+/// So many rays for each place, of the usual [effort](crate::effort), are worth knowing how much reflected light links should bring; no
+/// more than links themselves took where that is more.
 const CALIBRATE_RAYS: f32 = 64.0;
 /// This share of the rays shot so far is worth knowing what the solution is off by, …
 const CHECK_SHARE: f32 = 0.1;
-/// … from at least and at most so many leaves, and once more more closely where that does not tell whether it is fine enough.
+/// … from at least and at most so many leaves, …
 const CHECKED_LEAVES: [u64; 2] = [64, 2000];
+/// … and more closely where that does not tell whether it is fine enough, or else by how much it is not: once, or as long as it takes no
+/// more than this share. A look costs little beside a pass.
+const CLEAR_SHARE: f32 = 0.5;
 /// From one iteration to the next no more of a change is left than the share that the brightest material reflects, and this.
 const REFLECTED_MARGIN: f32 = 0.02;
 
@@ -128,7 +132,7 @@ impl<L: LightField> Solver<L> {
     ) {
         for _ in 0..MOST_FOLLOWED {
             let goes_on = pass.reflects && !*stopped && !self.account.is_over() && self.stats.spent.is_none();
-            if !goes_on || self.waiting() < FOLLOWED_SHARE * pass.tolerance {
+            if !goes_on || self.waiting() < FOLLOWED_SHARE * pass.aim.tolerance {
                 break;
             }
             self.refine(pass, stopped, watch);
@@ -210,7 +214,10 @@ impl<L: LightField> Solver<L> {
         let (start, account) = (Instant::now(), self.account);
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         let mut gather = std::mem::take(&mut self.gather);
-        let rays = (CALIBRATE_RAYS * effort(pass.tolerance).powi(2)) as usize;
+        let usual = CALIBRATE_RAYS as u64 * gather.reflecting_places(self.light()) as u64;
+        // Where links needed few rays there is little to mend.
+        let most = self.stats.rays.max(usual);
+        let rays = most.min((usual as f64 * f64::from(pass.aim.effort).powi(2)) as u64) as usize;
         let shot = gather.calibrate(self.light(), &self.links, rays, &mut || {
             *stopped = *stopped || watch(&progress).is_break();
             if *stopped || account.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -241,11 +248,19 @@ impl<L: LightField> Solver<L> {
                 if *stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
         };
-        let mut found = look(first);
-        if let Some(unclear) = found.filter(|found| found.may_be(self.settings.error)) {
-            // A look costs little beside a pass more.
-            found = look(first.closer(&unclear)).map(|found| Residual { rays: unclear.rays + found.rays, ..found });
+        let (error, most) =
+            (self.settings.error, (CLEAR_SHARE * (self.stats.rays + self.stats.check_rays) as f32) as u64);
+        let (mut how, mut found, mut rays) = (first, look(first), 0);
+        while let Some(unclear) = found.filter(|found| !found.tells(error)) {
+            let times = if rays == 0 { 1 } else { 4 };
+            rays += unclear.rays;
+            if times * unclear.rays > most && how != first {
+                break;
+            }
+            how = how.closer(&unclear);
+            found = look(how);
         }
+        found = found.map(|found| Residual { rays, ..found });
         if let Some(residual) = &found {
             self.stats.error = Some(residual.error());
             self.stats.bias = -residual.bias();
@@ -258,8 +273,9 @@ impl<L: LightField> Solver<L> {
     /// Lets light settle anew over the links that there are, for which it is found out how they reach leaves where it is not
     /// known yet.
     pub(crate) fn settle_again(&mut self, stopped: &mut bool, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) {
-        let tolerance = self.unfinished.tolerance.min(1.0);
-        let pass = Pass { number: 1, tolerance, reflects: true, closely: true };
+        let aim = self.unfinished.aim;
+        let aim = Aim { tolerance: aim.tolerance.min(1.0), ..aim };
+        let pass = Pass { number: 1, aim, reflects: true, closely: true };
         let prepared = self.prepared;
         if !prepared {
             // Nothing is refined here, before which clusters are judged.

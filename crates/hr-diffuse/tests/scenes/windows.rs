@@ -35,6 +35,9 @@ fn absorbed(surfaces: Vec<Surface>, lights: Vec<Light>) -> f64 {
     let input = SceneInput { surfaces, materials, lights, ..SceneInput::default() };
     let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
+    // Rays do not take what they seldom find for an error. Behind a blind passes end with a little more than was asked for.
+    let found = solver.stats().error;
+    assert!(found.is_some_and(|error| error <= 0.07), "{found:?}");
     let (elements, nodes) = (solver.elements(), &solver.elements().nodes);
     let of_room = |leaf: &u32| nodes[*leaf as usize].material == 0;
     let power = |leaf: u32| f64::from(nodes[leaf as usize].area * solver.exitant().irradiance[leaf as usize].x);
