@@ -287,7 +287,7 @@ mod tests {
             quad(y, x, z, 0),
         ];
         let input = SceneInput { surfaces, materials: vec![wall, lamp, floor], ..SceneInput::default() };
-        let mut solver = Solver::new(&input, Settings::with_error(0.025), field).expect("the room is sound");
+        let mut solver = Solver::new(&input, Settings::with_error(0.03), field).expect("the room is sound");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         solver
     }

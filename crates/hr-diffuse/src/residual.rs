@@ -534,7 +534,7 @@ mod tests {
 
     fn solved(surfaces: Vec<Surface>, materials: Vec<DiffuseMaterial>) -> Solver {
         let input = SceneInput { surfaces, materials, ..SceneInput::default() };
-        let mut solver = Solver::new(&input, Settings::with_error(0.01), ()).expect("the room is sound");
+        let mut solver = Solver::new(&input, Settings::with_error(0.018), ()).expect("the room is sound");
         solver.solve(&mut |_| ControlFlow::Continue(()));
         solver
     }

@@ -65,11 +65,11 @@ fn what_is_not_spent_changes_nothing() {
 #[test]
 fn memory_is_kept_to_and_light_stays() {
     // Coarser ones have no thirtieth that the scene would fit in.
-    let free = solve(0.007, Budget::default());
+    let free = solve(0.015, Budget::default());
     // Where leaves stay large some shadows are missed, or are all that is seen: those of the ball and the box where they stand, at the last.
     for (share, off) in [(2, 0.15), (4, 0.15), (10, 0.15), (30, 0.2)] {
         let budget = free.stats.bytes / share;
-        let solution = solve(0.007, within(budget));
+        let solution = solve(0.015, within(budget));
         let stats = &solution.stats;
         assert_eq!((stats.spent, stats.stopped), (Some(Spent::Memory), false), "a {share}th");
         // Refinement that has ended links what has no link yet, as it is.

@@ -88,7 +88,7 @@ fn off(solution: &Solution, room: usize, exact: &[(f32, f32)], times: f32) -> f3
 
 /// An exact solution of one room: a much finer one.
 fn exact() -> Vec<(f32, f32)> {
-    looks(&solve(&rooms(1, 1, 1.0), 0.005), 0)
+    looks(&solve(&rooms(1, 1, 1.0), 0.01), 0)
 }
 
 #[test]

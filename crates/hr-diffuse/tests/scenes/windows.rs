@@ -28,16 +28,21 @@ fn room(side: f64) -> Vec<Surface> {
     ]
 }
 
-/// Power that the room's surfaces absorb: all that comes in by the window, but for the little that leaves by it.
-fn absorbed(surfaces: Vec<Surface>, lights: Vec<Light>) -> f64 {
+fn solved(surfaces: Vec<Surface>, lights: Vec<Light>) -> Solver {
     let wall = DiffuseMaterial { two_sided: false, ..paint(Rgb::splat(REFLECTANCE)) };
     let materials = vec![wall, lamp(Rgb::ONE), paint(Rgb::ZERO)];
     let input = SceneInput { surfaces, materials, lights, ..SceneInput::default() };
     let mut solver = Solver::new(&input, Settings::with_error(0.05), ()).expect("the room is sound");
     solver.solve(&mut |_| ControlFlow::Continue(()));
-    // Rays do not take what they seldom find for an error. Behind a blind passes end with a little more than was asked for.
-    let found = solver.stats().error;
-    assert!(found.is_some_and(|error| error <= 0.07), "{found:?}");
+    solver
+}
+
+/// Power that the room's surfaces absorb: all that comes in by the window, but for the little that leaves by it.
+fn absorbed(surfaces: Vec<Surface>, lights: Vec<Light>) -> f64 {
+    absorbed_in(&solved(surfaces, lights))
+}
+
+fn absorbed_in(solver: &Solver) -> f64 {
     let (elements, nodes) = (solver.elements(), &solver.elements().nodes);
     let of_room = |leaf: &u32| nodes[*leaf as usize].material == 0;
     let power = |leaf: u32| f64::from(nodes[leaf as usize].area * solver.exitant().irradiance[leaf as usize].x);
@@ -72,7 +77,11 @@ fn a_lantern_shines_in() {
         let [x, z] = CORNER.map(|corner| corner + 0.5 * side);
         let away = DVec3::new(x, 0.0, z) - position;
         let comes_in = 30.0 * away.y / away.length().powi(3) * side * side;
-        assert_lit("a lantern", side, absorbed(room(side), vec![lantern]), comes_in);
+        let solver = solved(room(side), vec![lantern]);
+        assert_lit("a lantern", side, absorbed_in(&solver), comes_in);
+        // Rays seldom find the one bright spot there is, and do not take that for an error.
+        let found = solver.stats().error;
+        assert!(found.is_some_and(|error| error <= 0.05), "a window of {side} m: {found:?}");
     }
 }
 
