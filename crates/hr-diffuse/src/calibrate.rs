@@ -307,6 +307,14 @@ mod tests {
         (expected.into_iter().map(|of| of.place).collect(), factors)
     }
 
+    /// Where all links are proved free nothing is calibrated, and the rays are those that looked at what the solution is off by.
+    #[test]
+    fn rays_of_looks_are_counted() {
+        let solver = room(0.5);
+        assert_eq!(solver.stats.rays, 0, "nothing hides anything");
+        assert!(solver.stats.error.is_some() && solver.stats.check_rays > 0, "{:?}", solver.stats);
+    }
+
     #[test]
     fn what_is_missing_in_a_region_is_found() {
         let solver = room(0.5);

@@ -250,17 +250,16 @@ impl<L: LightField> Solver<L> {
         };
         let (error, most) =
             (self.settings.error, (CLEAR_SHARE * (self.stats.rays + self.stats.check_rays) as f32) as u64);
-        let (mut how, mut found, mut rays) = (first, look(first), 0);
+        let (mut how, mut found, mut shot) = (first, look(first), 0);
         while let Some(unclear) = found.filter(|found| !found.tells(error)) {
-            let times = if rays == 0 { 1 } else { 4 };
-            rays += unclear.rays;
-            if times * unclear.rays > most && how != first {
+            if how != first && 4 * unclear.rays > most {
                 break;
             }
             how = how.closer(&unclear);
+            shot += unclear.rays;
             found = look(how);
         }
-        found = found.map(|found| Residual { rays, ..found });
+        found = found.map(|found| Residual { rays: shot + found.rays, ..found });
         if let Some(residual) = &found {
             self.stats.error = Some(residual.error());
             self.stats.bias = -residual.bias();
