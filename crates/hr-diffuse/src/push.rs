@@ -123,7 +123,7 @@ pub(crate) struct Push {
 }
 
 impl Push {
-    /// Finds the places and their weights but for those `known`, for a solution held to this; where it is to none,
+    /// Finds the places and their weights but for those `known`, for a solution held to an aim; where there is none,
     /// and where `watch` breaks, by orientation and distance alone. The weights that are kept take no more than `room` bytes.
     pub(crate) fn new<L: LightField>(
         light: Light<'_, L>,
