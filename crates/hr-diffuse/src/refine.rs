@@ -438,10 +438,13 @@ fn decide<L: LightField>(
     let split = |verdict: Option<Verdict>| if stopped { None } else { verdict };
     let by_bounds = weight * interval.error();
     let at_stake = weight * interval.most * UNSEEN;
+    // Of clusters samples miss what is small, which may see nothing else: without it the row of what it sees would be wrong.
     if skips.averted
         && touching
+        && r.is_patch()
+        && s.is_patch()
         && !(r.is_flat() && s.is_flat())
-        && at_stake <= tolerance.error
+        && at_stake <= tolerance.lost
         && !segments::any_facing(light, pair.receiver, pair.sender, PROBES)
     {
         return Verdict::Facing;
@@ -586,9 +589,9 @@ fn split_self<L: LightField>(light: Light<'_, L>, node: u32, tolerance: Toleranc
         };
     }
     // The inside of a curved surface: split while the light that would be lost matters.
-    let at_stake = light.emitted_most(node) * weight;
+    let at_stake = light.emitted_most(node) * weight * grazing(element, element);
     let splittable = element.is_patch() && element.radius > tolerance.smallest;
-    if at_stake > tolerance.error && splittable && !stopped { Verdict::SplitBoth } else { Verdict::Facing }
+    if at_stake > tolerance.lost && splittable && !stopped { Verdict::SplitBoth } else { Verdict::Facing }
 }
 
 /// Whether an element has parts, or may get some.

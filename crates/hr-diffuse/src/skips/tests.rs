@@ -128,6 +128,57 @@ fn pairs_that_hardly_face_each_other_change_little() {
     assert!(apart < 0.2 * ERROR, "{apart} of the mean radiosity");
 }
 
+/// Downlights in black cans above a pieced ceiling. A lid gets light from its can's inside, though beside all else that is near it it is so small
+/// that no pair of random points finds that the two face each other.
+#[test]
+fn lids_of_cans_are_lit_by_their_insides() {
+    const CAN: u32 = 2;
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let quad = |corner: DVec3, a: DVec3, b: DVec3| Shape::Quad([corner, corner + a, corner + a + b, corner + b]);
+    let (size, ceiling) = (DVec3::new(6.0, 5.0, 3.0), 3.0 * z);
+    let mut shapes = vec![
+        (quad(DVec3::ZERO, x * size.x, y * size.y), GREY),
+        (quad(DVec3::ZERO, y * size.y, z * size.z), GREY),
+        (quad(x * size.x, z * size.z, y * size.y), GREY),
+        (quad(DVec3::ZERO, z * size.z, x * size.x), GREY),
+        (quad(y * size.y, x * size.x, z * size.z), GREY),
+    ];
+    let ends = ([0.0, 0.9, 1.1, 2.9, 3.1, 4.9, 5.1, 6.0], [0.0, 1.15, 1.35, 3.65, 3.85, 5.0]);
+    let pieces =
+        |ends: &[f64]| ends.windows(2).map(|ends| (ends[0], ends[1] - ends[0])).enumerate().collect::<Vec<_>>();
+    let mut lids = Vec::new();
+    for (i, (left, width)) in pieces(&ends.0) {
+        for (j, (front, depth)) in pieces(&ends.1) {
+            let corner = x * left + y * front + ceiling;
+            if i % 2 == 0 || j % 2 == 0 {
+                shapes.push((quad(corner, y * depth, x * width), GREY));
+                continue;
+            }
+            let at = corner + 0.5 * (x * width + y * depth);
+            shapes.push((Shape::Cone { ends: [at, at + 0.2 * z], radii: [0.1; 2] }, CAN));
+            lids.push(shapes.len());
+            shapes.push((Shape::Ring { center: at + 0.2 * z, normal: -z, inner: 0.0, outer: 0.1 }, CAN));
+            shapes.push((Shape::Sphere { center: at + 0.14 * z, radius: 0.04 }, LAMP));
+        }
+    }
+    let surfaces = shapes.into_iter().map(|(shape, material)| Surface::new(shape, material)).collect();
+    let material = |reflectance, exitance| DiffuseMaterial {
+        reflectance: Rgb::splat(reflectance),
+        exitance: Rgb::splat(exitance),
+        two_sided: true,
+    };
+    let materials = vec![material(0.6, 0.0), material(0.0, 1000.0), material(0.05, 0.0)];
+    let input = SceneInput { surfaces, materials, ..SceneInput::default() };
+    let solvers = [Skips::ALL, Skips { averted: false, ..Skips::ALL }].map(|skips| solve(&input, 0.1, (), skips));
+    for lid in lids {
+        let [found, all] = solvers.each_ref().map(|solver| {
+            let node = solver.elements.surface_nodes[lid][0];
+            solver.exitant.irradiance[node as usize].x
+        });
+        assert!((found / all - 1.0).abs() < 0.05, "{lid}: {found}, not {all}");
+    }
+}
+
 /// What is proved free is what all segments find, and what is proved blocked brings nothing: but for segments that touch
 /// edges where surfaces meet, and pairs of which no drawn points face each other.
 #[test]
