@@ -32,7 +32,7 @@ use lights::Lights;
 use shared::{CORNERS, FIRST_LOBE_RAYS, LOBE_RAYS, Shaded, Shared, corners_first};
 use sight::Sight;
 
-/// Mirrors in mirrors end here.
+/// Mirrors in mirrors end here, and lobes in lobes.
 const MOST_BOUNCES: u32 = 4;
 /// Where surfaces that meet in a pixel differ by c times its mean, a grid of n × n rays knows that mean to about 0.3 c / n^1.5. So
 /// many are shot that this is 0.3 divided by …
@@ -466,11 +466,13 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         }
         let met = self.met(hit, leaf, direction, reflector);
         let faint = self.solution.faint[element.material as usize];
-        let mirrors = met.reflector.mirror() != Rgb::ZERO && bounce < MOST_BOUNCES;
+        // Distributions blur what is seen in a lobe where a ray in another one ended.
+        let goes_on = bounce < MOST_BOUNCES
+            && (met.reflector.mirror() != Rgb::ZERO || faint == Rgb::ZERO && self.lobe(&met).is_none());
         let glossy = match self.mode {
             Mode::Distributions if bounce == 0 => self.shared(&met, shared),
             Mode::Distributions => self.interpolated(&met),
-            Mode::Samples if bounce == 0 || mirrors => self.reflected(&met, bounce, sampler, shared),
+            Mode::Samples if bounce == 0 || goes_on => self.reflected(&met, bounce, sampler, shared),
             Mode::Samples | Mode::Gather if faint != Rgb::ZERO => faint * irradiance * FRAC_1_PI,
             // Of leaves whose light no link asked for there is no distribution.
             Mode::Samples | Mode::Gather
@@ -619,7 +621,8 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             return light;
         }
         if self.lobe(met).is_none() {
-            let count = shared.lobe_rays;
+            // Rays are split once: each of them has one to go on.
+            let count = std::mem::replace(&mut shared.lobe_rays, 1);
             // Where there are fewer or more of them than before, they are spread evenly among themselves.
             let dimension = if count == FIRST_LOBE_RAYS { 1 } else { 6 };
             let turns: [Vec2; LOBE_RAYS] =
@@ -632,6 +635,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
                 self.leaving(*hit, leaf, direction, bounce + 1, &sampler.apart(number), shared)
             };
             let followed = self.tracer.glossy(&met.hit, -met.away, pairs, &turns[..count], &mut beyond);
+            shared.lobe_rays = count;
             if bounce == 0 {
                 shared.noise[1].add(followed.element_sum(), count);
             }
@@ -773,7 +777,7 @@ fn glow<B: Basis>(solution: &Solution<GlossyField<B>>, node: u32, light: f32) ->
 mod tests {
     use super::*;
     use crate::solved::{Purpose, Solved, Wanted as Wait};
-    use glossy_ext::Lambert;
+    use glossy_ext::{Lambert, Reflector, Ward};
     use hr_diffuse::{Settings, Shape, Surface};
     use std::f64::consts::FRAC_1_SQRT_2;
     use std::ops::ControlFlow;
@@ -862,7 +866,48 @@ mod tests {
         // Both are off by 10 to 13 % at errors of 0.045 to 0.08, leaves by up to a sixth of that more: which is nearer hangs on the error.
         assert!(count > 300 && off[0] < 0.12 && off[0] < 1.2 * off[1], "of {count} points: {off:?}");
         let known = caster.spared().known_ends;
-        assert!(known > 1000, "{known}");
+        assert!(known > 300, "{known}");
+    }
+
+    /// In a room of polished walls most of what is seen in a lobe is seen in another one.
+    #[test]
+    fn lobes_are_followed_in_lobes() {
+        let quad = |corner: DVec3, a: DVec3, b: DVec3| Shape::Quad([corner, corner + a, corner + a + b, corner + b]);
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let walls = [(0.0 * x, x, y), (z, y, x), (0.0 * x, y, z), (x, z, y), (0.0 * x, z, x), (y, x, z)];
+        let mut surfaces: Vec<_> = walls.into_iter().map(|(at, a, b)| Surface::new(quad(at, a, b), 0)).collect();
+        surfaces[0].material = 2;
+        surfaces.push(Surface::new(quad(DVec3::new(0.4, 0.4, 0.95), 0.2 * y, 0.2 * x), 1));
+        let material = |reflector: Arc<dyn Reflector>, exitance| Material {
+            name: String::new(),
+            reflector,
+            exitance: Rgb::splat(exitance),
+            two_sided: false,
+            texture: None,
+            base_color: Rgb::ONE,
+        };
+        let lambert = |reflectance| Arc::new(Lambert::new(Rgb::splat(reflectance)).expect("a reflectance"));
+        let polished = Ward::new(Rgb::splat(0.1), Rgb::splat(0.7), 0.05).expect("polished");
+        let materials =
+            vec![material(Arc::new(polished), 0.0), material(lambert(0.0), 10.0), material(lambert(0.5), 0.0)];
+        let scene = Arc::new(Scene { surfaces, materials, ..Scene::default() });
+        let [eye, target, up] = [[0.2, 0.25, 0.5], [0.9, 0.8, 0.6], [0.0, 0.0, 1.0]];
+        let camera = Camera { eye, target, up, fov_x: 60.0, width: 48, height: 32 };
+        let go_on = &mut |_: &_| ControlFlow::Continue(());
+        let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.1), false, go_on).expect("a sound scene");
+        let found = RayCaster::new(&scene, &solved.solution, Mode::Samples).render(&camera, &|_| ()).pixels;
+        let truth = PathTracer::new(&scene, &solved.solution.scene.visibility).render(&camera, 512, 0, &|_| ());
+        // What shines itself is left out, and all is seen in blocks of 8 × 8.
+        let block = |pixels: &[Rgb], [x, y]: [usize; 2]| -> f32 {
+            (0..64).map(|i| pixels[(y * 8 + i / 8) * 48 + x * 8 + i % 8].element_sum().min(3.0)).sum()
+        };
+        let (mut off, mut all) = (0.0, 0.0);
+        for at in (0..24).map(|i| [i % 6, i / 6]) {
+            let [found, truth] = [&found, &truth.image.pixels].map(|pixels| block(pixels, at));
+            (off, all) = (off + (found - truth).abs(), all + truth);
+        }
+        // Where distributions end rays it is 9 %.
+        assert!(off < 0.05 * all, "{}", off / all);
     }
 
     /// A ground below slats that hide all but a third of a wide lamp, as of a sky behind blinds, and how a camera sees it. Of much less that is
