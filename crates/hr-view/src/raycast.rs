@@ -865,6 +865,7 @@ mod tests {
         let off = [leaves, samples].map(|sum| (sum / along - 1.0).abs());
         // Both are off by 10 to 13 % at errors of 0.045 to 0.08, leaves by up to a sixth of that more: which is nearer hangs on the error.
         assert!(count > 300 && off[0] < 0.12 && off[0] < 1.2 * off[1], "of {count} points: {off:?}");
+        // Rays go on where they meet gloss again, so that next to all of these are the test's own.
         let known = caster.spared().known_ends;
         assert!(known > 300, "{known}");
     }
