@@ -44,6 +44,8 @@ const SHOWN_SHARE: f32 = 0.25;
 /// What a distribution that is shown may be wrong by, relative to itself: at least this, or the error asked for where that is less; and at
 /// most half, or highlights would lose their outline.
 const SHOWN_ERROR: [f32; 2] = [0.1, 0.5];
+/// Of what counts for no link so much is negligible: however much more of it is sent, that is a number.
+const MOST_NEGLIGIBLE: f32 = 1e30;
 /// A leaf is reflected anew where so much less of its light is negligible than when it was reflected.
 const FINER: f32 = 0.5;
 
@@ -374,7 +376,7 @@ impl<L: LightField> Solver<L> {
         }
         let error = DETAIL_SHARE * if is_new { NEW_SHARE } else { 1.0 } * self.link_error(self.settings.tolerance());
         for Standing { leaf, negligible, .. } in leaves {
-            *negligible = (error / by_leaf[*leaf as usize]).min(f32::MAX);
+            *negligible = (error / by_leaf[*leaf as usize]).min(MOST_NEGLIGIBLE);
         }
     }
 

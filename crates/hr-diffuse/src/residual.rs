@@ -39,7 +39,11 @@ const TOWARD_SENDERS: u32 = 32;
 /// An error is known if its standard error is less than this share of it.
 pub(crate) const KNOWN: f32 = 0.1;
 /// Noise of more than this share of what was found makes it seem more.
-const MOST_NOISE: f32 = 0.5;
+const MOST_NOISE: f32 = 0.75;
+
+/// So many times as many leaves look closer, at least and at most.
+const LEAST_MORE: f32 = 2.0;
+const MOST_MORE: f32 = 4.0;
 
 /// Leaves that a thread looks from between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 32;
@@ -111,9 +115,16 @@ pub(crate) struct Look {
 }
 
 impl Look {
-    /// Four times as many rays, where they tell the most: each leaf's own, or those of more leaves.
-    pub(crate) fn closer(self, found: &Residual) -> Self {
-        if found.is_noisy() { Self { finer: 2 * self.finer, ..self } } else { Self { leaves: 4 * self.leaves, ..self } }
+    /// More rays, where they tell the most whether there is more than an error: four times as many of each leaf, or those of as many more
+    /// leaves as should be enough, up to four times as many.
+    pub(crate) fn closer(self, found: &Residual, error: f32) -> Self {
+        if found.is_noisy() {
+            return Self { finer: 2 * self.finer, ..self };
+        }
+        let [apart, known] = [0.5 * (found.error() - error).abs(), KNOWN * found.error()];
+        let enough = if found.error() > error { apart.min(known) } else { apart };
+        let more = (found.uncertain / enough).powi(2).max(LEAST_MORE).min(MOST_MORE);
+        Self { leaves: (self.leaves as f32 * more).ceil() as usize, ..self }
     }
 }
 
@@ -167,17 +178,17 @@ pub(crate) fn residual<L: LightField>(
         let part = found.len()..leaves.min(found.len() + each * threads::current_num_threads());
         found.extend(threads::map_range(part, 1, look));
     }
-    let (mut off_by, mut noise) = (Deviations::default(), Deviations::default());
+    let (mut agreed, mut noise) = (Sum::default(), Sum::default());
     let (mut signed, mut total, mut direct, mut rays) = (0.0, 0.0, 0.0, 0);
     for leaf in &found {
         let [a, b] = leaf.estimates.map(f64::from);
         let solution = f64::from(leaf.solution);
         let share = (mean + solution).recip();
-        let off = 0.5 * (a + b) - solution;
-        off_by.add(share * off);
+        let [off, other] = [a, b].map(|estimate| share * (estimate - solution));
+        agreed.add(0.5 * (off.signum() * other + other.signum() * off));
         // Half the difference of the estimates is distributed as the noise of their mean.
-        noise.add(share * 0.5 * (a - b));
-        signed += share * off;
+        noise.add(0.5 * (off - other).abs());
+        signed += 0.5 * (off + other);
         total += share * 0.5 * (a + b);
         direct += share * f64::from(leaf.direct);
         rays += u64::from(leaf.rays);
@@ -185,12 +196,12 @@ pub(crate) fn residual<L: LightField>(
     if total <= 0.0 {
         return Some(Residual { rays, ..Residual::default() });
     }
-    // Of the difference of the squares, whose standard error is that of both.
-    let square = (off_by.sum.powi(2) - noise.sum.powi(2)).max(0.0);
-    let doubt = 2.0 * (off_by.sum * off_by.doubt()).hypot(noise.sum * noise.doubt());
-    let uncertain = (square + doubt).sqrt() - square.sqrt();
+    let absolute = without_noise(agreed.sum, noise.sum);
+    let more = |agreed, noise| without_noise(agreed, noise) - absolute;
+    let uncertain =
+        more(agreed.sum.max(0.0) + agreed.doubt(), noise.sum).hypot(more(agreed.sum, noise.sum + noise.doubt()));
     Some(Residual {
-        absolute: (square.sqrt() / total) as f32,
+        absolute: (absolute / total) as f32,
         signed: (signed / total) as f32,
         uncertain: (uncertain / total) as f32,
         noise: (noise.sum / total) as f32,
@@ -199,20 +210,32 @@ pub(crate) fn residual<L: LightField>(
     })
 }
 
-/// A sum of absolute values.
+/// Sum of the absolute values x of what leaves are off by, of which two estimates are known: `agreed`, that of the one with the
+/// other's sign, on the mean of both ways round, and `noise`, that of the noise of the mean of both.
+///
+/// Whatever the noise is, it is independent in both, so that a leaf's part in `agreed` is expected to be |x| where there is none and never
+/// more. Where differences and noise are normal, of standard deviations σ and τ for one estimate, it is |x| σ / √(σ² + τ²), and τ is √2
+/// times the noise of the mean: solved for |x|. The square root of the difference of squares, which is right there, too, says up to a
+/// third too much where a few leaves have most of the noise.
+fn without_noise(agreed: f64, noise: f64) -> f64 {
+    let agreed2 = agreed.max(0.0).powi(2);
+    (0.5 * (agreed2 + (agreed2 * (agreed2 + 8.0 * noise * noise)).sqrt())).sqrt()
+}
+
+/// A sum.
 #[derive(Clone, Copy, Debug, Default)]
-struct Deviations {
+struct Sum {
     sum: f64,
     squares: f64,
 }
 
-impl Deviations {
+impl Sum {
     fn add(&mut self, value: f64) {
-        self.sum += value.abs();
+        self.sum += value;
         self.squares += value * value;
     }
 
-    /// About the standard error of the sum.
+    /// About its standard error.
     fn doubt(&self) -> f64 {
         self.squares.sqrt()
     }
@@ -497,8 +520,43 @@ mod tests {
     fn looks_get_closer_where_they_tell_the_most() {
         let look = Look { leaves: 100, finer: 1 };
         let found = |absolute, noise| Residual { absolute, noise, ..Residual::default() };
-        assert_eq!(look.closer(&found(0.01, 0.02)), Look { leaves: 100, finer: 2 }, "noise hides what is off");
-        assert_eq!(look.closer(&found(0.02, 0.01)), Look { leaves: 400, finer: 1 });
+        assert_eq!(look.closer(&found(0.01, 0.02), 0.1), Look { leaves: 100, finer: 2 }, "noise hides what is off");
+        let leaves =
+            |absolute, uncertain, error| look.closer(&Residual { uncertain, ..found(absolute, 0.0) }, error).leaves;
+        assert_eq!(leaves(0.04, 0.03, 0.05), 400, "nothing is known");
+        assert_eq!(leaves(0.04, 0.0086, 0.05), 296, "three times as many should do");
+        assert_eq!(leaves(0.04, 0.0051, 0.05), 200);
+        assert_eq!(leaves(0.2, 0.035, 0.05), 307, "by how much it is more is to be known, too");
+    }
+
+    /// Whether few leaves have all of the noise or all have their share, what they are off by is found, or a little more than that.
+    #[test]
+    fn noise_of_some_leaves_is_not_what_all_are_off_by() {
+        const COUNT: u32 = 20_000;
+        // Box and Muller.
+        let normal = |seed: u32, i: u32| {
+            let [u, v] = [2 * i, 2 * i + 1].map(|i| f64::from(unit(hash(seed, i))));
+            (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+        };
+        let found = |noise: &dyn Fn(u32) -> f64| {
+            let (mut agreed, mut noises, mut off_by, mut mean) = (0.0, 0.0, 0.0, 0.0);
+            for i in 0..COUNT {
+                let x = normal(1, i);
+                let [a, b] = [2, 3].map(|seed| x + noise(i) * normal(seed, i));
+                agreed += 0.5 * (a.signum() * b + b.signum() * a);
+                noises += 0.5 * (a - b).abs();
+                mean += 0.5 * (a + b).abs();
+                off_by += x.abs();
+            }
+            let by_squares = (mean * mean - noises * noises).sqrt();
+            [without_noise(agreed, noises), by_squares].map(|found| found / off_by)
+        };
+        let [even, _] = found(&|_| 1.5);
+        assert!((even - 1.0).abs() < 0.03, "{even}");
+        let [uneven, by_squares] = found(&|i| if i.is_multiple_of(4) { 4.0 } else { 0.2 });
+        assert!((1.0..1.18).contains(&uneven), "{uneven}");
+        assert!(by_squares > 1.22, "{by_squares}");
+        assert_eq!(without_noise(-1.0, 3.0), 0.0, "estimates that contradict each other");
     }
 
     /// Sixteen times as many rays from each leaf leave a fourth of the noise, and find the same to what was known of it.

@@ -13,7 +13,7 @@ use crate::sent::Sent;
 use crate::transport::Exitant;
 use std::ops::ControlFlow;
 
-/// Iterations end when all that are to come would change the solution by less than this share of the error.
+/// Light has settled when all iterations to come would change the solution by less than this share of the error.
 const CONVERGED_SHARE: f32 = 0.02;
 /// The same while an extension's light is sent in proportion to what arrives.
 const EXPECTED_SHARE: f32 = 0.3;
@@ -38,6 +38,29 @@ const CLEAR_SHARE: f32 = 0.5;
 /// From one iteration to the next no more of a change is left than the share that the brightest material reflects, and this.
 const REFLECTED_MARGIN: f32 = 0.02;
 
+/// When iterations end.
+#[derive(Clone, Copy)]
+struct Until {
+    /// After so many at most, or …
+    most: u32,
+    /// … when all that are to come would change the solution by less than this share of the error: with what leaves have reflected of
+    /// much of it, …
+    share: f32,
+    /// … and once more with what all of an extension's leaves reflect of all of it.
+    finely: bool,
+}
+
+impl Until {
+    /// Light is there roughly.
+    const ROUGHLY: Self = Self { most: FEW_ITERATIONS, share: 1.0, finely: true };
+    /// It is sent in proportion to what arrives.
+    const EXPECTED: Self = Self { most: MOST_ITERATIONS, share: EXPECTED_SHARE, finely: false };
+    /// It has settled, so that links can be compared with rays.
+    const COMPARABLE: Self = Self { most: MOST_ITERATIONS, share: CONVERGED_SHARE, finely: false };
+    /// Nothing more is to come.
+    const SETTLED: Self = Self { finely: true, ..Self::COMPARABLE };
+}
+
 impl<L: LightField> Solver<L> {
     /// Iterates until light has settled, as far as a pass needs it.
     pub(super) fn settle(
@@ -50,18 +73,18 @@ impl<L: LightField> Solver<L> {
         let warms = self.settings.transport == Transport::Gather && self.elements.nodes[0].active;
         if !pass.closely || warms {
             let how = if pass.reflects && !pass.closely { Reflect::Reshaped } else { Reflect::Not };
-            self.iterate_until(pass, (FEW_ITERATIONS, 1.0, how), stopped, watch);
+            self.iterate_until(pass, (Until::ROUGHLY, how), stopped, watch);
         }
         if pass.closely && !*stopped {
-            self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, Reflect::Reshaped), stopped, watch);
+            self.iterate_until(pass, (Until::COMPARABLE, Reflect::Reshaped), stopped, watch);
         }
     }
 
-    /// Iterates, so many times at most, until what is to come is below a share of the error, with or without the extension's light.
+    /// Iterates until light has settled so far, with or without the extension's light.
     fn iterate_until(
         &mut self,
         pass: Pass,
-        (most, share, how): (u32, f32, Reflect),
+        (Until { most, share, finely }, how): (Until, Reflect),
         stopped: &mut bool,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) {
@@ -71,10 +94,10 @@ impl<L: LightField> Solver<L> {
         let account = self.account;
         let reflects = matches!(how, Reflect::Reshaped | Reflect::Changed);
         let mut before = self.begin_shooting(reflects);
-        // Light settles with what leaves have reflected of much of it, and once more with what all reflect of all of it.
         let directional = reflects && self.elements.nodes[0].active;
         self.feedback.restart();
-        let (mut settled, mut finely, mut next) = (false, !directional || self.shot.is_some(), how);
+        let mut is_left = finely && directional && self.shot.is_none();
+        let (mut settled, mut next) = (false, how);
         for iteration in 0..if before.is_some() { MOST_ITERATIONS } else { most } {
             let fraction = pass.fraction(0.6 + 0.3 * (iteration as f32 / (iteration as f32 + 4.0)));
             let progress = self.progress(Phase::Transport, fraction);
@@ -89,8 +112,8 @@ impl<L: LightField> Solver<L> {
                 self.feedback.rein_in(&self.exitant.irradiance, kept);
             }
             settled = self.remaining(residual) < share * self.settings.tolerance() && iteration > 0;
-            if settled && !finely {
-                (settled, finely, next) = (false, true, Reflect::Changed);
+            if settled && is_left {
+                (settled, is_left, next) = (false, false, Reflect::Changed);
             }
             if *stopped || settled || account.is_over() {
                 break;
@@ -169,7 +192,9 @@ impl<L: LightField> Solver<L> {
         let calibrated = self.calibrate(pass, stopped, watch);
         if renewed || calibrated {
             self.convergence.restart();
-            self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, Reflect::Reshaped), stopped, watch);
+            self.iterate_until(pass, (Until::SETTLED, Reflect::Reshaped), stopped, watch);
+        } else if self.shot.is_none() && self.elements.nodes[0].active {
+            self.iterate_until(pass, (Until::SETTLED, Reflect::Changed), stopped, watch);
         }
     }
 
@@ -255,7 +280,7 @@ impl<L: LightField> Solver<L> {
             if how != first && 4 * unclear.rays > most {
                 break;
             }
-            how = how.closer(&unclear);
+            how = how.closer(&unclear, error);
             shot += unclear.rays;
             found = look(how);
         }
@@ -282,7 +307,7 @@ impl<L: LightField> Solver<L> {
             self.prepare_watched(pass, stopped, watch);
         }
         self.expect_in_proportion(pass, stopped, watch);
-        self.iterate_until(pass, (MOST_ITERATIONS, CONVERGED_SHARE, Reflect::Reshaped), stopped, watch);
+        self.iterate_until(pass, (Until::SETTLED, Reflect::Reshaped), stopped, watch);
         if !prepared {
             self.amend(pass, stopped, watch);
         }
@@ -299,7 +324,7 @@ impl<L: LightField> Solver<L> {
         if self.settings.transport != Transport::Gather || !self.elements.nodes[0].active {
             return;
         }
-        self.iterate_until(pass, (MOST_ITERATIONS, EXPECTED_SHARE, Reflect::InProportion), stopped, watch);
+        self.iterate_until(pass, (Until::EXPECTED, Reflect::InProportion), stopped, watch);
         let (mut was, mut is) = (Rgb::ZERO, Rgb::ZERO);
         for leaf in self.elements.patch_leaves().map(|leaf| leaf as usize) {
             if let Some(irradiance) = self.sent.get(leaf).and_then(Sent::irradiance) {
