@@ -123,8 +123,9 @@ impl Look {
         }
         let [apart, known] = [0.5 * (found.error() - error).abs(), KNOWN * found.error()];
         let enough = if found.error() > error { apart.min(known) } else { apart };
-        let more = (found.uncertain / enough).powi(2).max(LEAST_MORE).min(MOST_MORE);
-        Self { leaves: (self.leaves as f32 * more).ceil() as usize, ..self }
+        let more = (found.uncertain / enough).powi(2).clamp(LEAST_MORE, MOST_MORE);
+        // Where neither is any number they are as many.
+        Self { leaves: ((self.leaves as f32 * more).ceil() as usize).max(self.leaves), ..self }
     }
 }
 
