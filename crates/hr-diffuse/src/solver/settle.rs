@@ -193,7 +193,8 @@ impl<L: LightField> Solver<L> {
         if renewed || calibrated {
             self.convergence.restart();
             self.iterate_until(pass, (Until::SETTLED, Reflect::Reshaped), stopped, watch);
-        } else if self.shot.is_none() && self.elements.nodes[0].active {
+        } else if self.settings.transport == Transport::Gather && self.elements.nodes[0].active {
+            // What is shot has been reflected finely.
             self.iterate_until(pass, (Until::SETTLED, Reflect::Changed), stopped, watch);
         }
     }
