@@ -160,7 +160,7 @@ impl<L: LightField> Light<'_, L> {
             }
         }
         let share: f32 = standing.iter().map(|standing| standing.share).sum();
-        (met >= LEAST_MET && all > 0.0).then(|| sum * (PI * share / all))
+        (met >= LEAST_MET && all > 0.0).then(|| sum * self.times_as_much(sender) * (PI * share / all))
     }
 
     /// The same toward a receiver, whose `i`-th point and radius are given, weighted by the transfer's kernel: by pairs of points all over
@@ -209,7 +209,7 @@ impl<L: LightField> Light<'_, L> {
             }
         }
         let share: f32 = standing.iter().map(|standing| standing.share).sum();
-        Some(if all > 0.0 { sum * (PI * share / all) } else { Rgb::ZERO })
+        Some(if all > 0.0 { sum * self.times_as_much(sender) * (PI * share / all) } else { Rgb::ZERO })
     }
 
     /// How closely a flat sender is looked at for light on its way.
@@ -278,13 +278,14 @@ impl<L: LightField> Light<'_, L> {
         if over <= 0.0 {
             return Rgb::ZERO;
         }
-        sum * (standing.iter().map(|standing| standing.share).sum::<f32>() / over)
+        sum * self.times_as_much(sender) * (standing.iter().map(|standing| standing.share).sum::<f32>() / over)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::hierarchy::Element;
     use crate::hooks::{Arrived, Hierarchy, NodeId, Transfer};
     use crate::reflect::Senders;
     use crate::sampling::point4;
@@ -449,6 +450,36 @@ mod tests {
                 "{carried} of {truth} by points, which are enough then, at {height}"
             );
         }
+    }
+
+    /// A part that other leaves stand for sends as much less than they as it reflects less, however closely it is looked at.
+    #[test]
+    fn parts_send_as_much_as_they_reflect() {
+        let (mut solver, [standing, part]) = squares(0.0, Vec3::NEG_Z, (2.0, f32::INFINITY));
+        solver.exitant.reflected_as[part as usize] = standing;
+        solver.exitant.directional[standing as usize] = Rgb::splat(0.5);
+        let mut sent = |share: f32| {
+            solver.exitant.directional[part as usize] = Rgb::splat(share * 0.5);
+            let light = solver.light();
+            let seen_from =
+                |x: Vec3, n: Vec3, detail| light.directional_at(part, (x, n), (light.factor_at(x, n, part), detail)).x;
+            let Element { center, radius, .. } = *light.element(part);
+            let corner = light.scene.surfaces()[light.element(part).source as usize]
+                .sample(light.element(part).domain, 0.0, 0.5)
+                .0;
+            let inward = (center - corner).normalize();
+            [
+                light.directional(part, Vec3::NEG_Z).x,
+                light.directional_toward(part, standing).x,
+                seen_from(light.element(standing).center, Vec3::Z, Detail::carried(0.0)),
+                seen_from(corner - Vec3::Z * (0.02 * radius), inward, Detail::shown(0.0)),
+            ]
+        };
+        let (alike, fifth, dark) = (sent(1.0), sent(0.2), sent(0.0));
+        for (alike, fifth) in alike.into_iter().zip(fifth) {
+            assert!(alike > 0.0 && (fifth / alike - 0.2).abs() < 1e-5, "{fifth} of {alike}");
+        }
+        assert_eq!(dark, [0.0; 4], "a lamp that reflects nothing beside what reflects");
     }
 
     /// Where little is at stake, or both ends are far from each other, one direction is asked for.

@@ -187,9 +187,7 @@ impl<L: LightField> Light<'_, L> {
                 light += radiance(leaf) * strength * (cosine * share * PI);
             }
         }
-        if state != sender {
-            light *= self.times_as_much(sender, state);
-        }
+        light *= self.times_as_much(sender);
         // Intensity per area over the mean cosine is mean radiance; near the terminator both fade.
         match (holder.is_flat(), element.kind == Kind::Cluster) {
             (true, false) => light,
@@ -201,8 +199,13 @@ impl<L: LightField> Light<'_, L> {
     }
 
     /// How many times as much directional light a part of a node sends as the leaves that stand for the node, by channel: as many as they
-    /// reflect. Without it what lies in the dark would shine as the rest of it does.
-    fn times_as_much(&self, part: u32, node: u32) -> Rgb {
+    /// reflect. Without it what lies in the dark would shine as the rest of it does, and a lamp as the metal around it. 1 for what other
+    /// leaves, or its own, stand for.
+    pub(crate) fn times_as_much(&self, part: u32) -> Rgb {
+        let node = self.exitant.reflected_as[part as usize];
+        if node == part {
+            return Rgb::ONE;
+        }
         let reflects = |node: u32| self.exitant.directional[node as usize];
         let standing: Rgb = self.exitant.senders.of(node).iter().map(|of| reflects(of.leaf) * of.share).sum();
         // Where they are dark there is nothing to multiply.
