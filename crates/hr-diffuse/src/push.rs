@@ -31,6 +31,9 @@ const MOST_KEPT: usize = 1 << 26;
 /// Links that bring less than this share of all that arrives, times the square root of the tolerance and over the
 /// [effort](crate::effort), are not looked at closely.
 const FAINT_SHARE: f32 = 0.003;
+/// That is their share of what arrives at the dimmest leaf below a receiver, as of a wall that goes on into a dark room; but of no less than
+/// this share of all that arrives anywhere: nobody looks closely where it is darker still.
+const DIMMEST_SHARE: f32 = 0.01;
 /// Leaves look for themselves at links of their own that bring more than this share of their light: others let so much through as
 /// their segments found.
 const OWN_SHARE: f32 = 0.02;
@@ -78,7 +81,7 @@ const MAY_BE_VISIBLE: f32 = 0.5;
 /// Bytes that are kept for each link, …
 pub(crate) const LINK_BYTES: usize = size_of::<Spread>() + size_of::<f32>();
 /// … and for each leaf, beside its weights.
-pub(crate) const LEAF_BYTES: usize = size_of::<u32>() + size_of::<usize>() + size_of::<f32>();
+pub(crate) const LEAF_BYTES: usize = size_of::<u32>() + size_of::<usize>() + 2 * size_of::<f32>();
 /// Places whose weights a thread finds between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 32;
 
@@ -112,6 +115,8 @@ pub(crate) struct Push {
     /// By place that has weights: how much more of its view is taken up than links and weights tell. Of the dark part of a bright sender,
     /// which is all that a place sees next to where both meet, they tell little; yet it hides the rest.
     pub(crate) dim_views: Vec<f32>,
+    /// By place that has weights: what arrived [around](lit_around) it when it found them.
+    lit_then: Vec<f32>,
     /// Where the weights of each place begin; as many places as have kept ones, and the end of the last.
     first: Vec<usize>,
     /// By place, then by node from there up to the root, then by those links of the node that have weights.
@@ -145,6 +150,7 @@ impl Push {
             spared_looks: 0,
             rays: 0,
             dim_views: Vec::new(),
+            lit_then: Vec::new(),
             first: vec![0],
             weights: Vec::new(),
             weighted: Vec::new(),
@@ -186,7 +192,9 @@ impl Push {
             if aim.is_some() && watch().is_break() {
                 return Self::new(light, links, None, (room, None), watch);
             }
-            for looked in threads::map_mut(part, 4, |_, part| push.find(light, links, part, look)) {
+            let found = threads::map_mut(part, 4, |_, part| push.find(light, links, part, look));
+            for ((node, _), looked) in part.iter().zip(found) {
+                push.lit_then.push(lit_around(light, *node));
                 push.dim_views.push(looked.dim_view);
                 push.spared_looks += u64::from(looked.spared);
                 push.rays += u64::from(looked.rays);
@@ -401,19 +409,39 @@ pub(crate) fn is_shared<L: LightField>(light: Light<'_, L>, node: u32) -> bool {
     !element.is_flat() || element.child_count > 0
 }
 
+/// What arrives around a place (sum of channels): there and at the others of the same parent.
+fn lit_around<L: LightField>(light: Light<'_, L>, place: u32) -> f32 {
+    light.exitant.irradiance[light.element(place).parent as usize].element_sum()
+}
+
 /// By link, how its light is to be spread, and what it brings if it is wholly visible.
 pub(crate) fn spreads<L: LightField>(light: Light<'_, L>, links: &Links, aim: Option<Aim>) -> (Vec<Spread>, Vec<f32>) {
-    let mut means = vec![0.0; links.all().len()];
+    let (mut means, dimmest) = (vec![0.0; links.all().len()], dimmest(light));
     let spreads = threads::map_mut(&mut means, 256, |at, mean| {
-        let (spread, brings) = spread(light, &links.all()[at], aim);
+        let link = &links.all()[at];
+        let (spread, brings) = spread(light, link, aim, dimmest[link.receiver as usize]);
         *mean = brings;
         spread
     });
     (spreads, means)
 }
 
-/// Those of a link.
-fn spread<L: LightField>(light: Light<'_, L>, link: &Link, aim: Option<Aim>) -> (Spread, f32) {
+/// By node, the irradiance of the dimmest leaf below it that reflects (sum of channels), for which links are not [faint](DIMMEST_SHARE).
+fn dimmest<L: LightField>(light: Light<'_, L>) -> Vec<f32> {
+    let irradiance = |node: usize| light.exitant.irradiance[node].element_sum();
+    let (nodes, least) = (&light.elements.nodes, DIMMEST_SHARE * irradiance(0));
+    let mut dimmest = vec![f32::INFINITY; nodes.len()];
+    for (node, element) in nodes.iter().enumerate().rev() {
+        if element.child_count == 0 && element.importance > 0.0 {
+            dimmest[node] = irradiance(node).max(least);
+        }
+        dimmest[element.parent as usize] = dimmest[element.parent as usize].min(dimmest[node]);
+    }
+    dimmest
+}
+
+/// That of a link, to a receiver at whose `dimmest` leaf so much arrives.
+fn spread<L: LightField>(light: Light<'_, L>, link: &Link, aim: Option<Aim>, dimmest: f32) -> (Spread, f32) {
     let receiver = light.element(link.receiver);
     let even = if receiver.is_flat() || link.visibility == 0.0 { Spread::Even } else { Spread::Plain };
     let mean = light.emitted_toward(link).element_sum() * link.factor;
@@ -424,7 +452,7 @@ fn spread<L: LightField>(light: Light<'_, L>, link: &Link, aim: Option<Aim>) -> 
         (false, _) => f32::INFINITY,
     };
     let may_be_visible = if aim.is_some() { may_be_visible(link) } else { link.visibility.abs() };
-    let irradiance = light.exitant.irradiance[link.receiver as usize].element_sum();
+    let irradiance = light.exitant.irradiance[link.receiver as usize].element_sum().min(dimmest);
     let closely = mean > 0.0 && irradiance > 0.0 && mean * may_be_visible >= least * irradiance;
     (if closely { Spread::Exact } else { even }, mean)
 }
@@ -557,8 +585,8 @@ struct Place {
     uneven: f32,
     /// … and more is looked at whatever links let through (sum of channels).
     sure: f32,
-    /// So many times as many rays as usual find what is seen.
-    effort: f32,
+    /// What the solution is held to.
+    aim: Aim,
 }
 
 impl Place {
@@ -572,7 +600,7 @@ impl Place {
             much: MUCH_SHARE * aim.tolerance.sqrt() * irradiance.element_sum(),
             negligible: negligible(irradiance, aim.tolerance),
             faint: faint_share(aim) * irradiance.element_sum(),
-            effort: aim.effort,
+            aim,
             uneven: UNEVEN_SHARE * aim.tolerance * irradiance.element_sum(),
             sure: SURE_SHARE * aim.tolerance.sqrt() * irradiance.element_sum(),
         }
@@ -664,13 +692,17 @@ impl Place {
         let turned = self.turned(light, link);
         let far = self.spots(light).is_far(light.element(link.sender));
         let outlook = Outlook { turned, far, chance: None };
-        let chance = if self.is_faint(link, mean, outlook) { None } else { self.chance(light, link, mean * turned) };
+        let chance =
+            if self.is_faint(light, link, mean, outlook) { None } else { self.chance(light, link, mean * turned) };
         Outlook { chance, ..outlook }
     }
 
-    /// Whether a link is too far and brings too little to be looked at.
-    fn is_faint(&self, link: &Link, mean: f32, outlook: Outlook) -> bool {
-        outlook.far && mean * may_be_visible(link) * outlook.turned < self.faint
+    /// Whether a link brings too little to be looked at, and is far, or brings as little to all of its receiver.
+    fn is_faint<L: LightField>(&self, light: Light<'_, L>, link: &Link, mean: f32, outlook: Outlook) -> bool {
+        let may_bring = mean * may_be_visible(link);
+        let all = light.exitant.irradiance[link.receiver as usize].element_sum();
+        let is_faint_to_all = || is_shared(light, link.receiver) && may_bring < faint_share(self.aim) * all;
+        may_bring * outlook.turned < self.faint && (outlook.far || is_faint_to_all())
     }
 
     /// What a link brings to the place over what it brings to its receiver, after so many rays shot `before`; `mean` is what the link would
@@ -686,7 +718,7 @@ impl Place {
         let flat = element.is_flat();
         let visible = visible(link, Spread::Exact);
         // A place that is small or far is told apart by its orientation; so is one that gets next to nothing.
-        if self.is_faint(link, mean, outlook) {
+        if self.is_faint(light, link, mean, outlook) {
             let weight = Weight { unseen: link.visibility >= 0.0, ..self.plain(light, link, outlook.turned) };
             return Found { weight, ..Found::default() };
         }
@@ -738,8 +770,8 @@ impl Place {
     /// links go on with one sequence of points, so that they are spread evenly over the place.
     fn seen<L: LightField>(&self, light: Light<'_, L>, link: &Link, brings: f32, before: u32) -> (f32, u32) {
         let irradiance = light.exitant.irradiance[self.node as usize].element_sum();
-        let rays = self.effort * RAYS * brings / irradiance.max(f32::MIN_POSITIVE);
-        let rays = rays.clamp(LEAST_RAYS, self.effort * MOST_RAYS) as u32;
+        let rays = self.aim.effort * RAYS * brings / irradiance.max(f32::MIN_POSITIVE);
+        let rays = rays.clamp(LEAST_RAYS, self.aim.effort * MOST_RAYS) as u32;
         let (mut blocker, seed) = (u32::MAX, hash(self.node, 0x1eaf));
         let sequence = (seed, before..before + rays);
         let (seen, total, rays) = visibility(light, self.node, link.sender, sequence, (&Proof::Unknown, &mut blocker));

@@ -1,4 +1,7 @@
-use super::{FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, Place, Push, Spread, is_shared, visible};
+use super::{
+    DIMMEST_SHARE, FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, Place, Push, Spread, is_shared, lit_around, spreads,
+    visible,
+};
 use crate::effort::Aim;
 use crate::gather::{GROUPS, Group};
 use crate::links::{Link, Links};
@@ -154,4 +157,75 @@ fn links_that_look_blocked_lose_nothing() {
     };
     let (open, blocked) = (brought(|visibility| visibility), brought(|_| 0.0));
     assert!((blocked / open - 1.0).abs() < 0.1, "{blocked} of {open}");
+}
+
+/// Where a wall goes on into the dark, what is faint beside the light of all of it may be all that arrives there: the dark leaf looks at it,
+/// the others do not.
+#[test]
+fn what_is_faint_to_a_wall_counts_in_the_dark() {
+    let mut solver = solve(&room(), ERROR, (), Skips::ALL);
+    let aim = Aim::of(ERROR);
+    let looked = |solver: &crate::Solver| spreads(solver.light(), &solver.links, Some(aim)).0;
+    let before = looked(&solver);
+    let links = solver.links.all().to_vec();
+    let above = |solver: &crate::Solver, leaf: u32| {
+        let up = |&node: &u32| (node > 0).then(|| solver.elements.nodes[node as usize].parent);
+        std::iter::successors(Some(leaf), up).collect::<Vec<u32>>()
+    };
+    let faint = |&at: &usize| before[at] != Spread::Exact && is_shared(solver.light(), links[at].receiver);
+    let faint: Vec<usize> = (0..links.len()).filter(faint).collect();
+    let reflects = |leaf: &u32| solver.elements.nodes[*leaf as usize].importance > 0.0;
+    let faint_to = |leaf: u32| {
+        let above = above(&solver, leaf);
+        faint.iter().filter(|&&at| above.contains(&links[at].receiver)).count()
+    };
+    let dark = solver.elements.patch_leaves().filter(reflects).max_by_key(|&leaf| faint_to(leaf));
+    let dark = dark.expect("there are leaves");
+    solver.exitant.irradiance[dark as usize] = DIMMEST_SHARE * solver.exitant.irradiance[0];
+    let after = looked(&solver);
+    let (all_above, mut counted) = (above(&solver, dark), Vec::new());
+    for (at, link) in links.iter().enumerate() {
+        if !all_above.contains(&link.receiver) {
+            assert_eq!(before[at], after[at], "a link to elsewhere: {link:?}");
+        } else if before[at] != after[at] {
+            assert!(faint.contains(&at) && after[at] == Spread::Exact, "{link:?}");
+            counted.push(at);
+        }
+    }
+    assert!(!counted.is_empty(), "of {} links", faint.len());
+    let (light, push) = (solver.light(), &solver.gather.push);
+    let looks = |leaf: u32| {
+        let place = Place::new(light, leaf, push.places.middle(light.elements, leaf), aim);
+        let rays = |&at: &usize| {
+            let link = &links[at];
+            let mean = light.emitted_toward(link).element_sum() * link.factor;
+            place.weight(light, link, (mean, place.outlook(light, link, mean), 1.0), 0).rays
+        };
+        let own = above(&solver, leaf);
+        counted.iter().filter(|&&at| own.contains(&links[at].receiver)).map(rays).sum::<u32>()
+    };
+    assert!(looks(dark) > 0, "the dark leaf looks");
+    let others = push.places.nodes.iter().filter(|&&place| place != dark && reflects(&place));
+    assert_eq!(others.map(|&place| looks(place)).sum::<u32>(), 0, "all others have light enough");
+}
+
+/// Where there is much less light than was believed all look once more: not where one place found less.
+#[test]
+fn places_look_again_where_it_is_darker_than_it_was() {
+    let mut solver = solve(&room(), ERROR, (), Skips::ALL);
+    let mut gather = std::mem::take(&mut solver.gather);
+    let uneven = vec![0.0; solver.elements.nodes.len()];
+    let on = &mut || ControlFlow::Continue(());
+    let places = gather.push.places.nodes.clone();
+    gather.push.lit_then = places.iter().map(|&place| lit_around(solver.light(), place)).collect();
+    assert_eq!(gather.renew(solver.light(), &solver.links, &uneven, on), (0, 0), "nothing has changed");
+    let parent = |place: u32| solver.elements.nodes[place as usize].parent;
+    let (one, all) = (places[places.len() / 2], parent(places[places.len() / 2]));
+    let beside = places.iter().filter(|&&place| parent(place) == all).count() as u64;
+    solver.exitant.irradiance[one as usize] *= 0.5;
+    assert_eq!(gather.renew(solver.light(), &solver.links, &uneven, on).0, 0, "one of {beside}");
+    solver.exitant.irradiance[all as usize] *= 0.5;
+    let (renewed, rays) = gather.renew(solver.light(), &solver.links, &uneven, on);
+    assert!(renewed == beside && rays > 0, "{renewed} of {beside} places, {rays} rays");
+    assert_eq!(gather.renew(solver.light(), &solver.links, &uneven, on).0, 0, "once");
 }
