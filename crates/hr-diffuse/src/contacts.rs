@@ -43,11 +43,11 @@ const BEYOND: f32 = 0.05;
 /// The plane of a polygon that meets a leaf. Of the two normals it has the one with the first positive component, so that
 /// the parts of a larger polygon agree.
 #[derive(Clone, Copy, Debug)]
-struct Contact {
+pub(crate) struct Contact {
     normal: Vec3,
     height: f32,
     /// Whether all of the leaf's surface is on one side of it.
-    beside: bool,
+    pub(crate) beside: bool,
 }
 
 impl Contact {
@@ -247,7 +247,7 @@ fn contacts(scene: &SceneData, elements: &Elements, leaf: u32) -> SmallVec<[Cont
 
 /// The plane of a polygon that is not parallel to one with a normal, which may lie beside it, as walls beside floors do: no more than
 /// `near` of that is beyond.
-fn contact(surface: &Geometry, geometry: &Geometry, (normal, near): (Vec3, f32)) -> Option<Contact> {
+pub(crate) fn contact(surface: &Geometry, geometry: &Geometry, (normal, near): (Vec3, f32)) -> Option<Contact> {
     let plane = surface.is_polygon().then(|| outward(surface, 0))?;
     let [low, high] = geometry.heights(plane)?;
     let height = surface.point(Vec2::ZERO).dot(plane);
@@ -259,7 +259,7 @@ fn contact(surface: &Geometry, geometry: &Geometry, (normal, near): (Vec3, f32))
 }
 
 /// Where a polygon that reaches down to a height along a direction, or below it, is cut by the plane there.
-fn section(surface: &Geometry, direction: Vec3, height: f32) -> Option<[Vec3; 2]> {
+pub(crate) fn section(surface: &Geometry, direction: Vec3, height: f32) -> Option<[Vec3; 2]> {
     let points = surface.polygon()?;
     let mut ends: SmallVec<[Vec3; 2]> = SmallVec::new();
     for (i, &a) in points.iter().enumerate() {
@@ -273,7 +273,12 @@ fn section(surface: &Geometry, direction: Vec3, height: f32) -> Option<[Vec3; 2]
 }
 
 /// How much of a line lies within the convex outline of an element, or on its edge where it may be `beside` it, seen along its normal.
-fn length_within([from, to]: [Vec3; 2], (outline, beside): (&[Vec3], bool), normal: Vec3, element: &Element) -> f32 {
+pub(crate) fn length_within(
+    [from, to]: [Vec3; 2],
+    (outline, beside): (&[Vec3], bool),
+    normal: Vec3,
+    element: &Element,
+) -> f32 {
     let (mut first, mut last) = (0.0_f32, 1.0_f32);
     for (i, &a) in outline.iter().enumerate() {
         let b = outline[(i + 1) % outline.len()];

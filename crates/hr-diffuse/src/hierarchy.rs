@@ -13,6 +13,7 @@ use crate::rooms::{self, NO_ROOM, Rooms};
 use crate::scene::{Light, LightKind};
 use crate::sealed::{Side, is_back, lit_sides};
 use crate::skips::Skips;
+use crate::standing_lines;
 use crate::threads;
 use crate::tree::{Leaves, tree};
 use crate::visibility::Visibility;
@@ -503,7 +504,10 @@ impl Elements {
         }
         let geometry = &scene.surfaces()[parent.source as usize];
         let first = self.nodes.len() as u32;
-        let parts = geometry.split(parent.domain);
+        let parts = match standing_lines::parts(scene, &parent) {
+            Some(parts) => parts.into_iter().collect(),
+            None => geometry.split(parent.domain),
+        };
         for part in &parts {
             let mut child = patch(scene, parent.source, parent.kind, *part, None);
             child.parent = node;

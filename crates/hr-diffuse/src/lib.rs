@@ -73,6 +73,7 @@ mod sides;
 mod skips;
 pub mod solution;
 pub mod solver;
+mod standing_lines;
 pub mod stats;
 mod steady;
 pub mod threads;

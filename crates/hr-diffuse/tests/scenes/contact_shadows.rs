@@ -1,8 +1,9 @@
 //! Contact shadows: what stands on something is dark where it stands.
 
 use crate::fixtures::{lamp, on, paint, quad, solved, walls};
+use crate::paths::Paths;
 use glam::{DVec3, Vec3};
-use hr_diffuse::{Rgb, SceneInput, Settings, Shape, Solution, Surface, Visibility};
+use hr_diffuse::{Rgb, SceneInput, Settings, Shape, Solution, Surface};
 use std::f64::consts::{PI, TAU};
 
 const RADIUS: f64 = 0.5;
@@ -42,40 +43,17 @@ fn solution(ball: Vec<Surface>) -> Solution {
 fn around(solution: &Solution, distance: f64) -> [f32; 2] {
     const PLACES: u32 = 12;
     const PATHS: u32 = 4000;
-    let visibility = Visibility::new(solution.scene.surfaces());
-    let mut state = 1_u32;
-    let mut random = || {
-        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-        let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-        ((word >> 22) ^ word) as f32 / u32::MAX as f32
-    };
+    let mut paths = Paths::new(solution, LAMP, REFLECTANCE);
     let (mut ours, mut found) = (0.0, 0.0);
     for place in 0..PLACES {
         let angle = TAU * (f64::from(place) + 0.3) / f64::from(PLACES);
         let at = FOOT + distance * DVec3::new(angle.cos(), angle.sin(), 0.0);
-        let at = solution.scene.normalization.to_unit(at);
-        let down = visibility.closest(at + Vec3::Z * 1e-4, Vec3::NEG_Z, 0.0, 1.0).expect("there is the floor");
+        let down = paths.meets(at + 1e-3 * DVec3::Z, Vec3::NEG_Z).expect("there is the floor");
         let leaf = solution.leaf(&down).expect("it reflects");
         ours += solution.irradiance(leaf, down.uv).x;
-        for _ in 0..PATHS {
-            let (mut x, mut n, mut own) = (at, Vec3::Z, down.surface);
-            loop {
-                let (u, v) = (random(), random() * std::f32::consts::TAU);
-                let (a, b) = n.any_orthonormal_pair();
-                let direction = (a * v.cos() + b * v.sin()) * u.sqrt() + n * (1.0 - u).sqrt();
-                let Some(hit) = visibility.closest_except(x, direction, 0.0, f32::MAX, own) else { break };
-                if hit.surface == LAMP {
-                    found += 1.0;
-                    break;
-                }
-                if random() > REFLECTANCE {
-                    break;
-                }
-                (x, n, own) = (hit.point, if hit.front { hit.normal } else { -hit.normal }, hit.surface);
-            }
-        }
+        found += paths.irradiance(&down, PATHS);
     }
-    [ours / PLACES as f32, found / (PLACES * PATHS) as f32]
+    [ours, found].map(|sum| sum / PLACES as f32)
 }
 
 /// Light that leaves found out about while it was still bright where the ball stands is not kept.
