@@ -25,7 +25,7 @@ const LIKE: f32 = 0.01;
 /// … it counts where something stands on this share of its length in the element, …
 const LONG: f32 = 0.4;
 /// … and no part is narrower than this share of the whole.
-const NARROW: f32 = 0.1;
+const NARROW: f32 = 0.2;
 /// Parameters are rounded to this, so that parts beside each other are cut at the same ones.
 const STEP: f32 = 1.0 / 16384.0;
 
