@@ -81,7 +81,7 @@ const MAY_BE_VISIBLE: f32 = 0.5;
 /// Bytes that are kept for each link, …
 pub(crate) const LINK_BYTES: usize = size_of::<Spread>() + size_of::<f32>();
 /// … and for each leaf, beside its weights.
-pub(crate) const LEAF_BYTES: usize = size_of::<u32>() + size_of::<usize>() + 2 * size_of::<f32>();
+pub(crate) const LEAF_BYTES: usize = size_of::<u32>() + size_of::<usize>() + size_of::<f32>();
 /// Places whose weights a thread finds between two calls of `watch`: some milliseconds.
 const BETWEEN_WATCHES: usize = 32;
 
@@ -115,8 +115,6 @@ pub(crate) struct Push {
     /// By place that has weights: how much more of its view is taken up than links and weights tell. Of the dark part of a bright sender,
     /// which is all that a place sees next to where both meet, they tell little; yet it hides the rest.
     pub(crate) dim_views: Vec<f32>,
-    /// By place that has weights: what arrived [around](lit_around) it when it found them.
-    lit_then: Vec<f32>,
     /// Where the weights of each place begin; as many places as have kept ones, and the end of the last.
     first: Vec<usize>,
     /// By place, then by node from there up to the root, then by those links of the node that have weights.
@@ -150,7 +148,6 @@ impl Push {
             spared_looks: 0,
             rays: 0,
             dim_views: Vec::new(),
-            lit_then: Vec::new(),
             first: vec![0],
             weights: Vec::new(),
             weighted: Vec::new(),
@@ -192,9 +189,7 @@ impl Push {
             if aim.is_some() && watch().is_break() {
                 return Self::new(light, links, None, (room, None), watch);
             }
-            let found = threads::map_mut(part, 4, |_, part| push.find(light, links, part, look));
-            for ((node, _), looked) in part.iter().zip(found) {
-                push.lit_then.push(lit_around(light, *node));
+            for looked in threads::map_mut(part, 4, |_, part| push.find(light, links, part, look)) {
                 push.dim_views.push(looked.dim_view);
                 push.spared_looks += u64::from(looked.spared);
                 push.rays += u64::from(looked.rays);
@@ -407,11 +402,6 @@ fn by_place<'a>(mut weights: &'a mut [f32], first: &[usize], places: &[u32]) -> 
 pub(crate) fn is_shared<L: LightField>(light: Light<'_, L>, node: u32) -> bool {
     let element = light.element(node);
     !element.is_flat() || element.child_count > 0
-}
-
-/// What arrives around a place (sum of channels): there and at the others of the same parent.
-fn lit_around<L: LightField>(light: Light<'_, L>, place: u32) -> f32 {
-    light.exitant.irradiance[light.element(place).parent as usize].element_sum()
 }
 
 /// By link, how its light is to be spread, and what it brings if it is wholly visible.

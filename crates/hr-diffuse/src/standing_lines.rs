@@ -2,7 +2,7 @@
 //!
 //! Where a wall stands on a floor that goes on behind it, light ends at a line. An element on both sides of it has the mean of both, however
 //! small it is, and sends that to both sides: into a dark room next to a lit one comes as much light through the wall as through its door. So
-//! an element that is split is cut along such a line, not in its middle, and no element is on both sides any more (discontinuities of degree
+//! an element that is split is cut along such a line, not in its middle, and next to none is on both sides any more (discontinuities of degree
 //! 0: P. Heckbert, "Discontinuity meshing for radiosity", Eurographics Workshop on Rendering 1992; here of rectangles only, and along their
 //! sides, as most walls stand).
 

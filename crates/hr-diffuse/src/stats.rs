@@ -26,7 +26,7 @@ pub struct Stats {
     pub renewed_links: u64,
     /// … and those that stayed.
     pub kept_links: u64,
-    /// Places that found out anew how light reaches them, as it comes from other parts of senders than it did, or there is much less of it.
+    /// Places that found out anew how light reaches them, as it comes from other parts of senders than it did.
     pub renewed_places: u64,
     /// Leaves whose directional light would not have died out, as more came back than they sent: what they send, or what arrives there, was
     /// cut down until it did.

@@ -1,7 +1,7 @@
 //! Weights found once more, when light is in place: next to where surfaces meet senders are dark that were as bright as the rest of them when
-//! places first looked; and places are that did not know.
+//! places first looked.
 
-use super::{BETWEEN_WATCHES, Look, Place, Push, Spread, by_place, lit_around, visible};
+use super::{BETWEEN_WATCHES, Look, Place, Push, Spread, by_place, visible};
 use crate::Rgb;
 use crate::hooks::LightField;
 use crate::links::Links;
@@ -13,10 +13,6 @@ use std::ops::ControlFlow;
 const STALE_SHARE: f32 = 0.3;
 /// … those of them that may bring less by more than this share of that are asked.
 const MISSING_SHARE: f32 = 0.25;
-/// They are, too, at places around which no more than this share of the light arrives that did when they were found: what was faint beside
-/// that, or was left to chance, may be most of what there is. Parts of surfaces that are new had the light of what they are parts of. Were it the
-/// place's own light, those that found too little by chance would look again, and those that found too much would not.
-const DARKER: f32 = 0.7;
 /// Where more than this share of what a sender sends is an extension's, what was found stays, as its parts have no lobes of their own, …
 const DIRECTIONAL_SHARE: f32 = 0.1;
 /// … unless it takes up more than this share of the view: then it hides what else there was.
@@ -30,7 +26,7 @@ pub(super) fn is_told<L: LightField>(light: Light<'_, L>, sender: u32, view: f32
 }
 
 impl Push {
-    /// Finds the weights of those places anew that are darker than they were, or get less from near senders than their weights tell. By node, so much of its light is
+    /// Finds the weights of those places anew that get less from near senders than their weights tell. By node, so much of its light is
     /// `uneven`, distributed otherwise than when they were found; by link, what of it is `directional`. Returns the number of places; those
     /// that are left when `watch` breaks stay as they are.
     pub(crate) fn renew<L: LightField>(
@@ -49,9 +45,6 @@ impl Push {
             let node = self.places.nodes[index];
             let place = Place::new(light, node, self.places.middle(light.elements, node), self.aim);
             let irradiance = light.exitant.irradiance[node as usize].element_sum();
-            if lit_around(light, node) <= DARKER * self.lit_then[index] {
-                return irradiance > 0.0;
-            }
             let mut missing = 0.0;
             self.each_weight(light, links, index, |at, weight| {
                 let (link, most) = (&links.all()[at], weight.value * self.means[at]);
@@ -79,8 +72,7 @@ impl Push {
                 break;
             }
             let found = threads::map_mut(part, 4, |_, (_, part)| self.find(light, links, part, Look::Again));
-            for ((index, (node, _)), looked) in part.iter().zip(found) {
-                self.lit_then[*index] = lit_around(light, *node);
+            for ((index, _), looked) in part.iter().zip(found) {
                 dim_views[*index] = looked.dim_view;
                 rays += u64::from(looked.rays);
                 renewed += 1;

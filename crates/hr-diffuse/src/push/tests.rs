@@ -1,6 +1,5 @@
 use super::{
-    DIMMEST_SHARE, FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, Place, Push, Spread, is_shared, lit_around, spreads,
-    visible,
+    DIMMEST_SHARE, FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, Place, Push, Spread, is_shared, spreads, visible,
 };
 use crate::effort::Aim;
 use crate::gather::{GROUPS, Group};
@@ -207,25 +206,4 @@ fn what_is_faint_to_a_wall_counts_in_the_dark() {
     assert!(looks(dark) > 0, "the dark leaf looks");
     let others = push.places.nodes.iter().filter(|&&place| place != dark && reflects(&place));
     assert_eq!(others.map(|&place| looks(place)).sum::<u32>(), 0, "all others have light enough");
-}
-
-/// Where there is much less light than was believed all look once more: not where one place found less.
-#[test]
-fn places_look_again_where_it_is_darker_than_it_was() {
-    let mut solver = solve(&room(), ERROR, (), Skips::ALL);
-    let mut gather = std::mem::take(&mut solver.gather);
-    let uneven = vec![0.0; solver.elements.nodes.len()];
-    let on = &mut || ControlFlow::Continue(());
-    let places = gather.push.places.nodes.clone();
-    gather.push.lit_then = places.iter().map(|&place| lit_around(solver.light(), place)).collect();
-    assert_eq!(gather.renew(solver.light(), &solver.links, &uneven, on), (0, 0), "nothing has changed");
-    let parent = |place: u32| solver.elements.nodes[place as usize].parent;
-    let (one, all) = (places[places.len() / 2], parent(places[places.len() / 2]));
-    let beside = places.iter().filter(|&&place| parent(place) == all).count() as u64;
-    solver.exitant.irradiance[one as usize] *= 0.5;
-    assert_eq!(gather.renew(solver.light(), &solver.links, &uneven, on).0, 0, "one of {beside}");
-    solver.exitant.irradiance[all as usize] *= 0.5;
-    let (renewed, rays) = gather.renew(solver.light(), &solver.links, &uneven, on);
-    assert!(renewed == beside && rays > 0, "{renewed} of {beside} places, {rays} rays");
-    assert_eq!(gather.renew(solver.light(), &solver.links, &uneven, on).0, 0, "once");
 }
