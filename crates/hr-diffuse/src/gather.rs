@@ -78,7 +78,7 @@ impl Group {
 pub(crate) struct Gather {
     /// By link.
     groups: Vec<Group>,
-    pub(crate) push: Push,
+    push: Push,
     /// By place, as in `push`: what makes the sum of its form factors what it should be, by group.
     rows: Vec<[f32; GROUPS]>,
     /// By place of many leaves, in an enclosure: how much the sum of its form factors, which should be the same everywhere, seems to

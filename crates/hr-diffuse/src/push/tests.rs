@@ -192,9 +192,9 @@ fn what_is_faint_to_a_wall_counts_in_the_dark() {
         }
     }
     assert!(!counted.is_empty(), "of {} links", faint.len());
-    let (light, push) = (solver.light(), &solver.gather.push);
+    let (light, places) = (solver.light(), solver.gather.places());
     let looks = |leaf: u32| {
-        let place = Place::new(light, leaf, push.places.middle(light.elements, leaf), aim);
+        let place = Place::new(light, leaf, places.middle(light.elements, leaf), aim);
         let rays = |&at: &usize| {
             let link = &links[at];
             let mean = light.emitted_toward(link).element_sum() * link.factor;
@@ -204,6 +204,6 @@ fn what_is_faint_to_a_wall_counts_in_the_dark() {
         counted.iter().filter(|&&at| own.contains(&links[at].receiver)).map(rays).sum::<u32>()
     };
     assert!(looks(dark) > 0, "the dark leaf looks");
-    let others = push.places.nodes.iter().filter(|&&place| place != dark && reflects(&place));
+    let others = places.nodes.iter().filter(|&&place| place != dark && reflects(&place));
     assert_eq!(others.map(|&place| looks(place)).sum::<u32>(), 0, "all others have light enough");
 }
