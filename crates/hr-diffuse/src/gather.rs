@@ -439,9 +439,14 @@ impl Gather {
         self.receive(light, links, &self.arriving, incident, watch)
     }
 
-    /// What each link carried last.
+    /// What each link carries: where light is shot, in all once that has ended, and till then what it carried last.
     pub(crate) fn arriving(&self) -> &[Rgb] {
         &self.arriving
+    }
+
+    /// Takes it that each link carries so much.
+    pub(crate) fn know_arriving(&mut self, carried: Vec<Rgb>) {
+        self.arriving = carried;
     }
 
     /// Hands what each link carries to the extension, on active receivers, in place of what they had received.

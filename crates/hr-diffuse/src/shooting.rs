@@ -174,6 +174,7 @@ impl<L: LightField> Solver<L> {
         let received = self.gather.receive(self.light(), &self.links, &shot.carried, &mut incident, whole);
         debug_assert!(received.is_continue(), "nobody breaks");
         self.incident = incident;
+        self.gather.know_arriving(shot.carried);
         let middle = Instant::now();
         if reflects {
             self.sent.iter_mut().for_each(Sent::forget);

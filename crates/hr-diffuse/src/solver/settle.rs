@@ -266,7 +266,6 @@ impl<L: LightField> Solver<L> {
         let count = (CHECK_SHARE * self.stats.rays as f32 / RAYS_PER_LEAF as f32) as u64;
         let progress = self.progress(Phase::Transport, pass.fraction(0.9));
         let first = Look { leaves: count.clamp(least, most) as usize, finer: 1 };
-        // Of what is shot, the last of it: it comes from where all did.
         let brought = Brought::known(self.light(), &self.links, self.gather.arriving());
         let mut look = |how| {
             residual(self.light(), brought.as_ref(), how, &mut || {
