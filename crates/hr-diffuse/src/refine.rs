@@ -5,6 +5,7 @@
 //! not depend on the number of threads.
 
 use crate::Rgb;
+use crate::all_over::FAR;
 use crate::beams::Beam;
 use crate::budget::{Account, Growth, Spent};
 use crate::clock::Instant;
@@ -625,7 +626,8 @@ fn choose<L: LightField>(
     }
 }
 
-/// Unoccluded factor of a link: the mean over a flat receiver, to a relative error.
+/// Unoccluded factor of a link: the mean over a receiver that is a patch, to a relative error. Of what is bent it is such that it is the
+/// mean irradiance once it is turned toward the receiver's middle; of clusters, and of what is bent and far, that in the middle.
 fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) -> f32 {
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
     let direction = light.direction_to(r.center, pair.sender);
@@ -643,25 +645,28 @@ fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) ->
             light.factor_at(x, n, pair.sender)
         }
     };
-    if !r.is_flat() {
+    let turned = if r.is_flat() { 1.0 } else { r.mean_cosine(direction) };
+    let is_far = r.radius + s.radius < FAR * distance || r.normals.angle() > MOST_BENT;
+    if !r.is_patch() || !r.is_flat() && (is_far || turned < LEAST_COSINE) {
         return factor_at(r.center, direction);
     }
-    let normal = r.normals.axis;
     let geometry = &light.scene.surfaces()[r.source as usize];
     let accuracy = Accuracy { relative: f64::from(relative), absolute: 0.0, most: FACTOR_POINTS };
-    let factor = |x: DVec3, _| f64::from(factor_at(x.as_vec3(), normal));
+    let flat = r.is_flat().then_some(r.normals.axis);
+    let factor = |x: DVec3, n: DVec3| f64::from(factor_at(x.as_vec3(), flat.unwrap_or(n.as_vec3())));
     let mean = |domain: Domain, radius: f32, clear: f32| {
         let reach = if clear > 0.0 { radius / clear } else { f32::INFINITY };
         let receiver = Part { geometry, domain, back: r.kind == Kind::Back };
         form_factor::mean_factor(receiver, accuracy, f64::from(reach), factor).value as f32
     };
-    match Beam::of(light.scene, s) {
+    let all_over = match Beam::of(light.scene, s) {
         Some(beam) => beam.mean_over(geometry, r.domain, &|part| {
             let bounds = geometry.bounds(part);
             mean(part, bounds.radius(), bounds.center().distance(s.center))
         }),
         None => mean(r.domain, r.radius, distance - s.radius),
-    }
+    };
+    all_over / turned
 }
 
 /// Irradiance that a link would carry unoccluded (max channel).

@@ -42,6 +42,9 @@ pub use settings::{Phase, Progress, Settings, Transport};
 
 /// A link may be wrong by this share of a pass's tolerance, times the mean irradiance.
 const LINK_SHARE: f32 = 0.07;
+/// That is of rooms that reflect at least this share of their light, and holds for all that do; where less is, errors of it count as much as
+/// those of more do there.
+const REFLECTED: f32 = 0.5;
 /// Irradiance × importance × √(share of all area) that may be there on one side of a shadow's edge in a leaf and not on the other,
 /// as a share of the error asked for times the mean irradiance.
 const SHADOW_SHARE: f32 = 0.025;
@@ -348,7 +351,7 @@ impl<L: LightField> Solver<L> {
             error: self.link_error(pass.aim.tolerance),
             lost: self.link_error(self.settings.tolerance().min(pass.aim.tolerance)),
             shadow: if pass.closely || self.edges_known {
-                SHADOW_SHARE * self.settings.tolerance() * self.mean_irradiance()
+                SHADOW_SHARE * self.settings.tolerance() * self.reflected_irradiance()
             } else {
                 f32::INFINITY
             },
@@ -450,7 +453,14 @@ impl<L: LightField> Solver<L> {
 
     /// What a link may be wrong by in a pass of this tolerance: irradiance × [`weight`](Self::weight).
     pub(crate) fn link_error(&self, tolerance: f32) -> f32 {
-        LINK_SHARE * tolerance * self.mean_irradiance()
+        LINK_SHARE * tolerance * self.reflected_irradiance()
+    }
+
+    /// What errors that are weighted by what surfaces reflect are relative to: the [mean irradiance](Self::mean_irradiance) where they
+    /// reflect much, and less of it where it is dark all over.
+    fn reflected_irradiance(&self) -> f32 {
+        let Means { irradiance, reflected } = self.means();
+        irradiance * (reflected / REFLECTED).min(1.0)
     }
 
     /// What an error of the irradiance of a receiver counts.
@@ -461,14 +471,26 @@ impl<L: LightField> Solver<L> {
     /// Mean irradiance of the surfaces that any light reaches and that reflect any, as far as it [counts](Light::counted); before there
     /// is any, that which the emitted power would make if it were spread evenly. The measure of every tolerance.
     pub(crate) fn mean_irradiance(&self) -> f32 {
+        self.means().irradiance
+    }
+
+    fn means(&self) -> Means {
         let light = self.light();
         let (mut lit, mut area, mut power) = (0.0_f64, 0.0_f64, 0.0_f64);
+        // Of what is lit, and of all.
+        let (mut reflected, mut reflecting, mut all) = (0.0_f64, 0.0_f64, 0.0_f64);
         for leaf in self.elements.patch_leaves() {
             let (element, counted, leaf) = (&self.elements.nodes[leaf as usize], light.counted(leaf), leaf as usize);
             let irradiance = self.exitant.irradiance[leaf].max_element() * counted;
-            if irradiance > 0.0 && element.importance > 0.0 {
-                lit += f64::from(irradiance * element.area);
-                area += f64::from(element.area);
+            let importance = f64::from(element.importance);
+            if importance > 0.0 {
+                reflecting += f64::from(element.area) * importance;
+                all += f64::from(element.area);
+                if irradiance > 0.0 {
+                    lit += f64::from(irradiance * element.area);
+                    area += f64::from(element.area);
+                    reflected += f64::from(irradiance * element.area) * importance;
+                }
             }
             power += f64::from(self.exitant.radiosity[leaf].max_element() * element.area);
         }
@@ -479,7 +501,12 @@ impl<L: LightField> Solver<L> {
             };
             power += f64::from(light.intensity.max_element() * spread);
         }
-        if area > 0.0 { (lit / area) as f32 } else { (power / f64::from(self.area)) as f32 }
+        let (irradiance, reflected) = if area > 0.0 {
+            (lit / area, reflected / lit)
+        } else {
+            (power / f64::from(self.area), reflecting / all.max(f64::MIN_POSITIVE))
+        };
+        Means { irradiance: irradiance as f32, reflected: reflected as f32 }
     }
 
     /// The error that was found last, or what can be said without a look.
@@ -497,6 +524,14 @@ impl<L: LightField> Solver<L> {
             nodes: self.elements.nodes.len() as u64,
         }
     }
+}
+
+/// How bright it is.
+struct Means {
+    /// See [`Solver::mean_irradiance`].
+    irradiance: f32,
+    /// Share of it that surfaces reflect.
+    reflected: f32,
 }
 
 /// Links are refined to a tolerance, and light settles over them.

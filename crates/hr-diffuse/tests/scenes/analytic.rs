@@ -118,6 +118,32 @@ fn a_sphere_has_its_form_factor() {
 }
 
 /// A point light of 3 W/sr sends 3·Ω W onto the plate; distant light of 3 W/m² at 60° makes 1.5 W/m².
+/// A lamp within a can, which lights what is below its plane: parts of the can lie on both sides of that. What does not leave by the
+/// opening, a disk on the same axis, is on the can.
+#[test]
+fn a_can_has_the_light_of_the_lamp_in_it() {
+    const LAMP: f64 = 2.0 / 3.0;
+    const DEPTH: f64 = 2.2;
+    let material = |reflectance, exitance| DiffuseMaterial {
+        reflectance: Rgb::splat(reflectance),
+        exitance: Rgb::splat(exitance),
+        two_sided: true,
+    };
+    let z = DVec3::Z;
+    let can = Shape::Cone { ends: [z * -DEPTH, z * (DEPTH / 2.0)], radii: [1.0, 1.0] };
+    let lamp = Shape::Ring { center: DVec3::ZERO, normal: -z, inner: 0.0, outer: LAMP };
+    let surfaces = vec![Surface::new(can, 0), Surface::new(lamp, 1)];
+    let materials = vec![material(1e-3, 0.0), material(0.0, 1.0)];
+    let solution = solve(&SceneInput { surfaces, materials, ..SceneInput::default() }, 0.05);
+    let [inside] = solution.elements.surface_nodes[0][1..] else { panic!("two sides") };
+    let node = inside as usize;
+    let unit = solution.elements.nodes[solution.elements.surface_nodes[1][0] as usize].area;
+    let share = f64::from(solution.exitant.irradiance[node].x * solution.elements.nodes[node].area / unit);
+    let x = 1.0 + (1.0 + (1.0 / DEPTH).powi(2)) / (LAMP / DEPTH).powi(2);
+    let exact = 1.0 - 0.5 * (x - (x * x - 4.0 / (LAMP * LAMP)).sqrt());
+    assert!((share / exact - 1.0).abs() < 0.02, "{share} of its light instead of {exact}");
+}
+
 #[test]
 fn lights_without_extent_make_their_irradiance() {
     let light = |kind| Light { position: DVec3::new(0.5, 0.5, 0.75), intensity: Rgb::splat(3.0), kind };
@@ -196,6 +222,16 @@ fn room(boxes: &[(DVec3, DVec3)]) -> SceneInput {
     let wall = DiffuseMaterial { reflectance: Rgb::splat(0.5), exitance: Rgb::ZERO, two_sided: false };
     let lamp = DiffuseMaterial { exitance: Rgb::ONE, ..wall };
     SceneInput { surfaces, materials: vec![wall, lamp], ..SceneInput::default() }
+}
+
+/// Errors are relative to the light that there is, however little of it is reflected.
+#[test]
+fn a_dark_room_is_as_fine_as_a_bright_one() {
+    let mut input = room(&[(DVec3::new(-0.4, 0.3, -0.6), DVec3::new(0.5, 0.4, 0.8))]);
+    let bright = solve(&input, 0.1).stats.leaves;
+    input.materials.iter_mut().for_each(|material| material.reflectance *= 0.05);
+    let dark = solve(&input, 0.1).stats.leaves;
+    assert!(2 * dark > bright, "{dark} leaves instead of {bright}");
 }
 
 #[test]
