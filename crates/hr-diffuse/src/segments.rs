@@ -185,6 +185,12 @@ pub(crate) fn pick(weights: impl Iterator<Item = f32>, choice: f32, total: f32) 
 /// other point looks away.
 const TRIES: u32 = 6;
 
+/// The seed of an attempt: each has a sequence of its own. Points further on in the same one lie always as far from those that did not
+/// face each other, so that parts of what does would be drawn too seldom.
+fn again(seed: u32, attempt: u32) -> u32 {
+    seed ^ attempt.wrapping_mul(0x9E37)
+}
+
 /// Visibility estimated by the segments of a range of a sequence, of which something is proved: the weight (the transfer's kernel) that is not blocked, that of all,
 /// and the number of rays shot. All 0 where no drawn pair faced each other.
 #[must_use]
@@ -232,8 +238,8 @@ fn segment<L: LightField>(
     sender: u32,
     (seed, i, attempt): (u32, u32, u32),
 ) -> Option<Segment> {
-    let (index, round) = (i + attempt * 0x1_0000, seed ^ attempt.wrapping_mul(0x9E37));
-    let u = point4(seed, index);
+    let round = again(seed, attempt);
+    let u = point4(round, i);
     let choices = [unit(hash(round ^ 0x5bd1, i)), unit(hash(round ^ 0x1b87, i))];
     let (on, of) = ((choices[0], Vec2::new(u.x, u.y)), (choices[1], Vec2::new(u.z, u.w)));
     let on_receiver = |from| draw(scene, elements, receiver, on, Density::Receiving, from);
@@ -322,8 +328,8 @@ pub(crate) fn visibility_at<L: LightField>(
     }
     let seed = hash(seed, sender);
     let segment = |i: u32, attempt: u32| {
-        let (index, (x, n, surface)) = (i + attempt * 0x1_0000, from(i));
-        let drawn = (number(seed, index), point2(seed, index));
+        let (round, (x, n, surface)) = (again(seed, attempt), from(i));
+        let drawn = (number(round, i), point2(round, i));
         let s = draw(scene, elements, sender, drawn, Density::Power(exitant), Some(x))?;
         between((x, n, surface), &s, s)
     };
@@ -420,5 +426,45 @@ mod tests {
             });
             assert!((few - many).abs() < 0.12, "{pair:?}: {few}, {many}");
         }
+    }
+
+    /// Half of a ball does not face what is above it. A disk above its pole hides as much of the other half as independent points find.
+    #[test]
+    fn all_that_faces_is_drawn_as_often() {
+        let sphere = Shape::Sphere { center: DVec3::ZERO, radius: 0.1 };
+        let disk = Shape::Ring { center: DVec3::Z * 0.11, normal: DVec3::Z, inner: 0.0, outer: 0.02 };
+        let corner = |x: f64, y: f64| DVec3::new(0.1 * x, 0.1 * y, 1.0);
+        let plate = Shape::Quad([corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)]);
+        let surfaces = [plate, sphere, disk].map(|shape| Surface::new(shape, 0)).to_vec();
+        let material = DiffuseMaterial { reflectance: Rgb::splat(0.5), exitance: Rgb::ONE, two_sided: true };
+        let input = SceneInput { surfaces, materials: vec![material], ..SceneInput::default() };
+        let solver = Solver::new(&input, Settings::with_error(0.1), ()).expect("the scene is sound");
+        let (light, [plate, ball]) = (solver.light(), [0, 1].map(|at| solver.elements.surface_nodes[at][0]));
+        let seen = |seed: u32| {
+            let (seen, total, _) =
+                visibility(light, plate, ball, (seed, 0..64), (&Proof::Unknown, &mut u32::MAX.clone()));
+            seen / total
+        };
+        let by_segments = (0..2048).map(seen).sum::<f32>() / 2048.0;
+        let (mut free, mut all) = (0.0, 0.0);
+        for i in 0..1 << 16 {
+            let number = |k: u32| unit(hash(i, k));
+            let at = |node: u32, k: u32| {
+                let element = &solver.elements.nodes[node as usize];
+                let geometry = &light.scene.surfaces()[element.source as usize];
+                geometry.sample_area(element.domain, number(k), number(k + 1))
+            };
+            let ((x, n, _), (y, m, area)) = (at(plate, 1), at(ball, 3));
+            let to = y - x;
+            let weight = area * to.dot(n).max(0.0) * (-to.dot(m)).max(0.0) / to.length_squared().powi(2);
+            if weight > 0.0 {
+                all += weight;
+                let hidden = light.scene.visibility.occluded(x, y, [0, 1], &mut u32::MAX.clone());
+                free += if hidden { 0.0 } else { weight };
+            }
+        }
+        let exact = free / all;
+        assert!((0.9..0.99).contains(&exact), "some of it is hidden: {exact}");
+        assert!((by_segments - exact).abs() < 0.005, "{by_segments}, not {exact}");
     }
 }
