@@ -863,8 +863,8 @@ mod tests {
         }
         let [along, leaves, samples] = light;
         let off = [leaves, samples].map(|sum| (sum / along - 1.0).abs());
-        // Both are off by 10 to 13 % at errors of 0.045 to 0.08, leaves by up to a sixth of that more: which is nearer hangs on the error.
-        assert!(count > 300 && off[0] < 0.12 && off[0] < 1.2 * off[1], "of {count} points: {off:?}");
+        // Both are off by 6 to 8 %, leaves by up to a third of that more: which is nearer hangs on the error.
+        assert!(count > 300 && off[0] < 0.1 && off[0] < 1.4 * off[1], "of {count} points: {off:?}");
         // Rays go on where they meet gloss again, so that next to all of these are the test's own.
         let known = caster.spared().known_ends;
         assert!(known > 300, "{known}");

@@ -79,12 +79,12 @@ fn rays_into_lobes_are_nearer_to_the_truth_than_samples() {
     assert!(followed < 0.06 && followed < 0.6 * reflected, "off by {followed}, samples by {reflected}");
 }
 
-/// Of a coarse solution: its leaves are as large as the shadows.
+/// Of a coarse solution: its leaves are as large as the shadows. Both are off by the reference's noise, too.
 #[test]
 fn shadows_at_pixels_are_nearer_to_the_truth_than_those_of_vertices() {
     let scene = Scene::load("cornell").expect("built in");
     let [at_pixels, at_vertices] = off_by_samples(scene, 1, (1024, 0.3));
-    assert!(at_pixels < 0.025 && at_pixels < 0.7 * at_vertices, "off by {at_pixels}, vertices by {at_vertices}");
+    assert!(at_pixels < 0.01 && at_pixels < 0.8 * at_vertices, "off by {at_pixels}, vertices by {at_vertices}");
 }
 
 #[test]
