@@ -474,6 +474,7 @@ impl<L: LightField> Solver<L> {
         self.means().irradiance
     }
 
+    /// How bright it is, and how much of that is reflected; before there is any light, of all that reflects.
     fn means(&self) -> Means {
         let light = self.light();
         let (mut lit, mut area, mut power) = (0.0_f64, 0.0_f64, 0.0_f64);
@@ -502,7 +503,8 @@ impl<L: LightField> Solver<L> {
             power += f64::from(light.intensity.max_element() * spread);
         }
         let (irradiance, reflected) = if area > 0.0 {
-            (lit / area, reflected / lit)
+            // So dark that products are 0.
+            (lit / area, reflected / lit.max(f64::MIN_POSITIVE))
         } else {
             (power / f64::from(self.area), reflecting / all.max(f64::MIN_POSITIVE))
         };
