@@ -37,7 +37,8 @@ const RADIOSITY_SHARE: f32 = 0.5;
 /// The same where it stems from the sender's directional distribution: of the directions that lead to a receiver few
 /// see the peak of a narrow lobe.
 const DIRECTIONAL_SHARE: f32 = 0.05;
-/// Leaves of surfaces that reflect directional light have normals within this angle (radians) of their middle.
+/// Leaves of surfaces that reflect directional light have normals within this angle (radians) of their middle; of those that are bent by
+/// more, quadrature is no better than the middle.
 const MOST_BENT: f32 = 0.6;
 /// Mean cosine of a cluster's normals that is told from none: of what is seen edge-on.
 pub(crate) const LEAST_COSINE: f32 = 0.05;
@@ -627,7 +628,7 @@ fn choose<L: LightField>(
 }
 
 /// Unoccluded factor of a link: the mean over a receiver that is a patch, to a relative error. Of what is bent it is such that it is the
-/// mean irradiance once it is turned toward the receiver's middle; of clusters, and of what is bent and far, that in the middle.
+/// mean irradiance once it is turned toward the receiver's middle; of clusters, and of what is bent and far, or bent by much, that in the middle.
 fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) -> f32 {
     let (r, s) = (light.element(pair.receiver), light.element(pair.sender));
     let direction = light.direction_to(r.center, pair.sender);
@@ -646,8 +647,8 @@ fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) ->
         }
     };
     let turned = if r.is_flat() { 1.0 } else { r.mean_cosine(direction) };
-    let is_far = r.radius + s.radius < FAR * distance || r.normals.angle() > MOST_BENT;
-    if !r.is_patch() || !r.is_flat() && (is_far || turned < LEAST_COSINE) {
+    let by_middle = r.radius + s.radius < FAR * distance || r.normals.angle() > MOST_BENT || turned < LEAST_COSINE;
+    if !r.is_patch() || !r.is_flat() && by_middle {
         return factor_at(r.center, direction);
     }
     let geometry = &light.scene.surfaces()[r.source as usize];
