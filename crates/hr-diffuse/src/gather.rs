@@ -82,7 +82,8 @@ pub(crate) struct Gather {
     /// By place, as in `push`: what makes the sum of its form factors what it should be, by group.
     rows: Vec<[f32; GROUPS]>,
     /// By place of many leaves, in an enclosure: how much the sum of its form factors, which should be the same everywhere, seems to
-    /// change over it per unit of length, over the share of all but emitters, which it is put down to.
+    /// change over it per unit of length, over the share of all but emitters, which it is put down to; nowhere on it by more than all of
+    /// that.
     tilts: Vec<Vec3>,
     /// By link: the area that it lights, times what lets its light through, all places together. Where an extension takes part, else
     /// nothing.
@@ -143,7 +144,9 @@ impl Gather {
                 std::array::from_fn(|i| shares[index][i] * rows[index][i + 1]);
             let rest: f32 = rest.iter().sum();
             let closed = emitters + rest > CLOSED && rest > 0.0;
-            if closed { Vec3::from(slope) / rest } else { Vec3::ZERO }
+            // Where emitters are nearly all that is seen, what they change by is more than all the rest.
+            let most = light.element(push.places.nodes[index]).radius.max(f32::MIN_POSITIVE).recip();
+            if closed { (Vec3::from(slope) / rest).clamp_length_max(most) } else { Vec3::ZERO }
         };
         let tilts = slopes.into_iter().zip(push.places.joined()).map(tilt).collect();
         (self.rows, self.tilts) = (rows, tilts);
@@ -552,4 +555,50 @@ pub(crate) fn share<L: LightField>(light: Light<'_, L>, link: &Link, spread: Spr
     }
     let direction = light.direction_to(light.element(link.receiver).center, link.sender);
     visible * sender.mean_cosine(-direction)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::DVec3;
+    use std::f64::consts::TAU;
+    use std::ops::ControlFlow;
+
+    /// A bowl of small polygons under a sky of exitance 1, grey outside and inside.
+    fn bowl_under_the_sky() -> SceneInput {
+        let (rings, sectors) = (8, 48);
+        let at = |ring: i32, sector: i32| {
+            let (r, angle) = (f64::from(ring + 1) / f64::from(rings), TAU * f64::from(sector) / f64::from(sectors));
+            DVec3::new(r * angle.cos(), 0.2 * r * r, -r * angle.sin())
+        };
+        let quad = |ring, sector| {
+            let corners = [at(ring, sector), at(ring + 1, sector), at(ring + 1, sector + 1), at(ring, sector + 1)];
+            Surface::new(Shape::Quad(corners), 0)
+        };
+        let bowl = (0..rings - 1).flat_map(|ring| (0..sectors).map(move |sector| quad(ring, sector)));
+        let sky = Surface { flip: true, ..Surface::new(Shape::Sphere { center: DVec3::ZERO, radius: 10.0 }, 1) };
+        let grey = DiffuseMaterial { reflectance: Rgb::splat(0.8), exitance: Rgb::ZERO, two_sided: true };
+        let shining = DiffuseMaterial { reflectance: Rgb::ZERO, exitance: Rgb::ONE, two_sided: false };
+        SceneInput { surfaces: bowl.chain([sky]).collect(), materials: vec![grey, shining], ..SceneInput::default() }
+    }
+
+    /// What emitters that are nearly all there is to see change by over a place is not put down to the little that there is besides.
+    #[test]
+    fn no_part_of_a_place_has_less_than_nothing() {
+        let mut solver = Solver::new(&bowl_under_the_sky(), Settings::with_error(0.05), ()).expect("the bowl is sound");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        let gather = &solver.gather;
+        let places = gather.push.places.joined();
+        assert!(places.len() > 4, "{} places of many leaves", places.len());
+        let most = places.iter().zip(&gather.tilts).map(|(&index, tilt)| {
+            let radius = solver.elements.nodes[gather.push.places.nodes[index] as usize].radius;
+            tilt.length() * radius
+        });
+        let most = most.fold(0.0, f32::max);
+        assert!(most > 0.0 && most <= 1.001, "the rest changes by {most} of itself");
+        for leaf in solver.elements.patch_leaves() {
+            let irradiance = solver.exitant.irradiance[leaf as usize].max_element();
+            assert!((0.0..1.02).contains(&irradiance), "{irradiance} under a sky of 1");
+        }
+    }
 }
