@@ -59,7 +59,7 @@ impl<L: LightField> Solver<L> {
             area += weight;
         }
         // Directional light comes in steps: those are no series.
-        let ahead = if self.elements.nodes[0].active { Rgb::ZERO } else { self.convergence.ahead(change) };
+        let ahead = if self.elements.nodes[0].active { Rgb::ZERO } else { self.convergence.ahead(change, moved) };
         if ahead != Rgb::ZERO {
             let leaves: Vec<u32> = self.elements.patch_leaves().collect();
             for leaf in leaves {
