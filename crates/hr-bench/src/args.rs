@@ -61,6 +61,10 @@ pub struct ReferenceArgs {
     #[arg(long, value_name = "FILE.json|NAME")]
     pub camera: Option<String>,
 
+    /// Let this radiance come from everywhere, W/(m² sr), as `hr-view --sky` does
+    #[arg(long, value_name = "L", value_parser = hr_view::args::radiance)]
+    pub sky: Option<f32>,
+
     /// Paths per pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,

@@ -7,7 +7,7 @@ use crate::{
     BenchError, accuracy, bounds, curve, edits, float_image, form_factors, frames, growth, guide, paper, pictures,
     threads, together, transport, visibility,
 };
-use hr_scene::{Camera, ImageKind, Scene, ToneMap, builtin};
+use hr_scene::{Camera, ImageKind, Rgb, Scene, ToneMap, builtin};
 use hr_view::path_tracer::{self, PathTracer};
 use std::io::Write;
 use std::sync::Arc;
@@ -55,8 +55,11 @@ fn reference(args: &ReferenceArgs, out: Out<'_>) -> Result<(), BenchError> {
     for path in std::iter::once(&args.image).chain(&args.sigma) {
         ImageKind::of(path)?;
     }
-    let scene = Scene::load(&args.scene)?;
+    let mut scene = Scene::load(&args.scene)?;
     let mut camera = camera(&scene, args.camera.as_deref())?;
+    if let Some(radiance) = args.sky {
+        scene.add_sky(Rgb::splat(radiance))?;
+    }
     if let Some(width) = args.width {
         let height = f64::from(camera.height) * f64::from(width) / f64::from(camera.width);
         camera = Camera { width, height: (height.round() as u32).clamp(1, 16384), ..camera };

@@ -730,6 +730,8 @@ pub fn point_to_surface(geometry: &Geometry, domain: &Domain, back: bool, x: Vec
             Some((center, radius)) if *domain == Domain::WHOLE && geometry.is_convex(back) => {
                 point_to_sphere(x, n, center, radius)
             }
+            // All around.
+            Some((center, radius)) if *domain == Domain::WHOLE && x.distance(center) < radius => 1.0,
             _ if geometry.is_flat() => {
                 ring(Part { geometry, domain: *domain, back }, x.as_dvec3(), n.as_dvec3(), &GAUSS_4) as f32
             }

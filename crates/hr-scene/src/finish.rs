@@ -4,7 +4,7 @@ use crate::camera::unit;
 use crate::{Scene, SceneError, Warning};
 use glam::DVec3;
 use glossy_ext::Rgb;
-use hr_diffuse::{LightKind, Shape, Surface};
+use hr_diffuse::{Geometry, GeometryError, LightKind, Normalization, Shape, Surface};
 use std::collections::HashSet;
 
 /// A polygon or mantle thinner than this share of its length has no area: its normal would be noise.
@@ -12,7 +12,7 @@ const THINNEST: f64 = 1e-10;
 
 impl Scene {
     /// Makes a scene fit for the solver. Leaves out, with a counted [`Warning`] each: surfaces with coordinates that are
-    /// not finite, surfaces without area, exact duplicates (the same geometry on the same side with the same material,
+    /// not finite, surfaces without area or next to none, exact duplicates (the same geometry on the same side with the same material,
     /// at whichever corner it starts; of several texture coordinates the first ones stay), lights and cameras that are
     /// not finite. Exitance that is negative or not finite becomes 0. Normals and axes are made unit length;
     /// `attributes` are sorted and follow their surfaces.
@@ -67,10 +67,28 @@ impl Scene {
         self.attributes.dedup_by_key(|a| a.surface);
         self.drop_unusable_lights_and_cameras(&mut counts);
         self.warnings.extend(counts.0);
+        self.leave_out_vanishing();
         if self.surfaces.is_empty() {
             return Err(SceneError::empty(self.name, &self.warnings));
         }
         Ok(self)
+    }
+
+    /// Leaves out, with a counted [`Warning`], surfaces so small that nothing is left of them where the scene's extent is 1, in single
+    /// precision, as solvers have it.
+    pub(crate) fn leave_out_vanishing(&mut self) {
+        let normalization = Normalization::new(&self.surfaces);
+        let vanishes = |surface: &Surface| {
+            matches!(Geometry::from_surface(surface, &normalization), Err(GeometryError::Vanishing))
+        };
+        let stays: Vec<bool> = self.surfaces.iter().map(|surface| !vanishes(surface)).collect();
+        let Some(first) = stays.iter().position(|stays| !stays) else { return };
+        let mut counts = Counts::default();
+        for _ in stays.iter().filter(|stays| !**stays) {
+            counts.add(VANISHING, || format!("{}: surface {first}", self.name));
+        }
+        self.warnings.extend(counts.0);
+        self.keep_surfaces(&stays);
     }
 
     fn check_indices(&self) -> Result<(), SceneError> {
@@ -137,6 +155,7 @@ impl Scene {
     }
 }
 
+const VANISHING: &str = "surface that vanishes against the extent of the scene: left out";
 const DUPLICATE: &str = "duplicate of another surface: left out";
 
 /// Warnings by text, in the order in which they came first.
@@ -461,5 +480,18 @@ mod tests {
         assert_eq!(done.materials[0].exitance, Rgb::ZERO, "no negative light");
         assert_eq!(done.warnings.iter().map(|w| w.count).collect::<Vec<_>>(), [1, 3, 1], "{:?}", done.warnings);
         assert!(done.warnings[2].first.contains("camera 'bad': fov_x"), "{:?}", done.warnings[2]);
+    }
+
+    #[test]
+    fn what_vanishes_against_the_rest_is_left_out() {
+        let mut scene = Scene::load("cornell").expect("built in");
+        let before = scene.surfaces.clone();
+        let speck = [DVec3::ZERO, DVec3::X * 1e-12, DVec3::Y * 1e-12].map(|corner| corner + DVec3::splat(0.3));
+        scene.surfaces.insert(1, Surface::new(Shape::Triangle(speck), 0));
+        let scene = scene.finish().expect("the rest is there");
+        assert_eq!(scene.surfaces, before, "all but the speck");
+        let told = scene.warnings.iter().filter(|warning| warning.text == VANISHING).collect::<Vec<_>>();
+        assert_eq!(told.len(), 1, "{:?}", scene.warnings);
+        assert_eq!((told[0].count, told[0].first.as_str()), (1, "cornell: surface 1"), "{told:?}");
     }
 }

@@ -16,6 +16,7 @@ pub mod obj_file;
 mod polygon;
 mod reflectors;
 pub mod scene;
+mod sky;
 #[cfg(test)]
 mod testing;
 pub mod texture;

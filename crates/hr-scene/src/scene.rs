@@ -126,6 +126,12 @@ impl Scene {
         if stays.iter().all(|stays| !*stays) {
             return Err(SceneError::empty(format!("{} without '{material}'", self.name), &self.warnings));
         }
+        self.keep_surfaces(&stays);
+        Ok(())
+    }
+
+    /// Leaves out all surfaces but those that stay; attributes follow theirs.
+    pub(crate) fn keep_surfaces(&mut self, stays: &[bool]) {
         let mut count = 0;
         let indices: Vec<Option<u32>> = stays
             .iter()
@@ -134,14 +140,21 @@ impl Scene {
                 stays.then(|| count - 1)
             })
             .collect();
-        let mut stays = stays.into_iter();
-        self.surfaces.retain(|_| stays.next() == Some(true));
+        let mut stays = stays.iter();
+        self.surfaces.retain(|_| stays.next() == Some(&true));
         self.attributes.retain_mut(|attributes| {
             let index = indices[attributes.surface as usize];
             attributes.surface = index.unwrap_or_default();
             index.is_some()
         });
-        Ok(())
+    }
+
+    /// Whether no surface and no light emits anything: all of it is black.
+    #[must_use]
+    pub fn is_dark(&self) -> bool {
+        let shines = |material: u32| self.materials[material as usize].exitance != Rgb::ZERO;
+        self.lights.iter().all(|light| light.intensity == Rgb::ZERO)
+            && !self.surfaces.iter().any(|s| shines(s.material))
     }
 
     /// What the diffuse engine needs of this scene: its surfaces and lights, of each material the Lambertian share,

@@ -15,6 +15,8 @@ const EYE_HEIGHT: f64 = 0.62;
 const PLACES: [f64; 5] = [0.14, 0.86, 0.32, 0.68, 0.5];
 /// Share of all directions that must end on a surface for a place to count as within something.
 const WITHIN: f64 = 0.5;
+/// The same where there is no lamp, so that light comes from above if at all: a yard is stood in, a bowl is not.
+const WITHIN_OPEN: f64 = 0.8;
 /// The same for a closed room.
 const CLOSED: f64 = 0.9;
 /// How much better a view from outside must be to be taken in place of one from inside of a closed room.
@@ -65,7 +67,7 @@ impl Scene {
     }
 
     /// A camera for a scene that brings none: of some places inside, at eye height, and some around it, with everything in
-    /// view but a wide ground, that from which most can be seen that is lit. In a closed room it is one inside. 640 x 400
+    /// view but a wide ground, that from which most can be seen that is lit, by the sky where nothing shines. In a closed room it is one inside. 640 x 400
     /// pixels. Where the scene has cameras, it is the first one.
     #[must_use]
     pub fn default_camera(&self) -> Camera {
@@ -102,11 +104,12 @@ impl Scene {
             };
             low + (high - low) * share
         };
+        let within = if sight.has_lamps() { WITHIN } else { WITHIN_OPEN };
         let mut views = Vec::new();
         for eye in PLACES.iter().flat_map(|&across| PLACES.iter().map(move |&along| place(across, along))) {
             let ends: Vec<DVec3> = sphere_directions(64).filter_map(|d| Some(sight.wall(eye, d)? - eye)).collect();
             let share = ends.len() as f64 / 64.0;
-            if share < WITHIN {
+            if share < within {
                 continue;
             }
             let worth = if share >= CLOSED { INSIDE } else { 1.0 };
@@ -510,6 +513,36 @@ mod tests {
         // The balls of the heap are not lost on the ground: they are 2 m wide.
         let eye = DVec3::from(lit(heap(ground(4000.0))).default_camera().eye);
         assert!(eye.length() < 30.0, "near the balls: {eye}");
+    }
+
+    /// What stands in the open is looked at from where the sky lights it: a bowl from outside, a yard from inside.
+    #[test]
+    fn without_lamps_the_sky_is_the_lamp() {
+        let at = DVec3::new;
+        let dark = |surfaces: Vec<Surface>| Scene {
+            name: "made.obj".into(),
+            surfaces,
+            materials: vec![grey("wall", true, 0.0)],
+            ..Scene::default()
+        };
+        // Walls that face inward and, a little outside of them, outward.
+        let walls = |low: DVec3, high: DVec3, without: &[usize]| {
+            let outside = open_box(low - DVec3::splat(0.1), high + DVec3::splat(0.1), without);
+            let outside = outside.into_iter().map(|s| Surface { flip: true, ..s });
+            open_box(low, high, without).into_iter().chain(outside).collect::<Vec<_>>()
+        };
+        let within = |scene: &Scene| {
+            let (low, high) = scene.bounds().expect("surfaces");
+            let eye = DVec3::from(scene.default_camera().eye);
+            eye.cmpgt(low).all() && eye.cmplt(high).all()
+        };
+        let open = dark(walls(DVec3::ZERO, at(1.0, 0.3, 0.7), &[3]));
+        assert!(!within(&open), "a tray is looked at from outside: {:?}", open.default_camera());
+        let closed = dark(walls(DVec3::ZERO, at(1.0, 1.5, 0.7), &[]));
+        assert!(!within(&closed), "a cupboard is dark inside: {:?}", closed.default_camera());
+        let yard = dark(open_box(DVec3::ZERO, at(10.0, 10.0, 10.0), &[3]));
+        let yard = Scene { materials: vec![grey("wall", false, 0.0)], ..yard };
+        assert!(within(&yard), "a yard is looked at from inside: {:?}", yard.default_camera());
     }
 
     #[test]

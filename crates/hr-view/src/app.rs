@@ -7,7 +7,7 @@ use crate::export;
 use crate::glossy::Mode;
 use crate::html;
 use crate::interrupt::{Interrupt, STOPPING};
-use crate::loading::{is_dark, load};
+use crate::loading::load;
 use crate::metering;
 use crate::progress::Progress;
 use crate::raycast::{RayCaster, Spared};
@@ -262,7 +262,7 @@ impl Show<'_> {
 
     /// Where nothing shines at all, that has been said.
     fn warn_if_black(&self, is_black: bool) {
-        if is_black && !is_dark(&self.solved.scene) {
+        if is_black && !self.solved.scene.is_dark() {
             self.progress.say(
                 "warning: all is black: nothing that is lit is in view; give --camera a view of it, and see whether lamps are \
                  enclosed or surfaces face away",

@@ -29,6 +29,10 @@ pub struct Args {
     #[arg(long, value_name = "MATERIAL")]
     pub leave_out: Vec<String>,
 
+    /// Let this radiance come from everywhere, W/(m² sr): for scenes in the open, or without lamps
+    #[arg(long, value_name = "L", value_parser = radiance, allow_negative_numbers = true)]
+    pub sky: Option<f32>,
+
     /// No window: one image; .pfm and .exr hold linear radiance, unclamped, .png is tone-mapped
     #[arg(long, value_name = "OUT")]
     pub image: Option<PathBuf>,
@@ -150,6 +154,17 @@ fn seconds(text: &str) -> Result<f64, String> {
         // A duration of more seconds than this would not fit one.
         Ok(value) if (0.0..=1e9).contains(&value) => Ok(value),
         _ => Err("must be a number of seconds from 0 to 1e9, such as 10".into()),
+    }
+}
+
+/// Reads the radiance of a sky.
+///
+/// # Errors
+/// What would be right.
+pub fn radiance(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value > 0.0 && value <= 1e20 => Ok(value),
+        _ => Err("must be a radiance above 0 and up to 1e20, such as 1".into()),
     }
 }
 

@@ -15,21 +15,8 @@ pub(crate) fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewE
     // A camera's file first: it is read at once, and a mistake in it shows before the wait for a large scene.
     let in_file = args.camera.as_deref().filter(|name| Camera::is_file(name)).map(Camera::load).transpose()?;
     let mut scene = Scene::load(&args.scene)?;
-    for warning in scene.warnings.iter().take(MOST_WARNINGS) {
-        let times = if warning.count > 1 { format!(", {} times", warning.count) } else { String::new() };
-        progress.say(&format!("warning: {} ({}{times})", warning.text, warning.first));
-    }
-    if let Some(more) = scene.warnings.len().checked_sub(MOST_WARNINGS).filter(|more| *more > 0) {
-        progress.say(&format!("warning: {more} more kinds of warnings"));
-    }
     for material in &args.leave_out {
         scene.leave_out(material)?;
-    }
-    if is_dark(&scene) {
-        progress.say(
-            "warning: nothing in the scene shines, all will be black; give a material emission or add a light, such as one of \
-             KHR_lights_punctual",
-        );
     }
     if let Some(camera) = in_file {
         scene.cameras.insert(0, ("--camera".to_owned(), camera));
@@ -41,11 +28,21 @@ pub(crate) fn load(args: &Args, progress: &Progress) -> Result<Arc<Scene>, ViewE
     } else if scene.cameras.is_empty() {
         scene.cameras.push(("default".to_owned(), scene.default_camera()));
     }
+    if let Some(radiance) = args.sky {
+        scene.add_sky(Rgb::splat(radiance))?;
+    }
+    for warning in scene.warnings.iter().take(MOST_WARNINGS) {
+        let times = if warning.count > 1 { format!(", {} times", warning.count) } else { String::new() };
+        progress.say(&format!("warning: {} ({}{times})", warning.text, warning.first));
+    }
+    if let Some(more) = scene.warnings.len().checked_sub(MOST_WARNINGS).filter(|more| *more > 0) {
+        progress.say(&format!("warning: {more} more kinds of warnings"));
+    }
+    if scene.is_dark() {
+        progress.say(
+            "warning: nothing in the scene shines, all will be black; give a material emission, add a light, such as one of \
+             KHR_lights_punctual, or let light come from everywhere by --sky 1",
+        );
+    }
     Ok(Arc::new(scene))
-}
-
-/// Whether no surface and no light emits anything.
-pub(crate) fn is_dark(scene: &Scene) -> bool {
-    let shines = |material: u32| scene.materials[material as usize].exitance != Rgb::ZERO;
-    scene.lights.iter().all(|light| light.intensity == Rgb::ZERO) && !scene.surfaces.iter().any(|s| shines(s.material))
 }

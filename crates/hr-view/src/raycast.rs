@@ -92,6 +92,7 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     lights: Vec<OnceLock<Box<Lights>>>,
     /// Where lobes are followed: not with distributions, and not where nothing is glossy.
     ends: Option<Ends<B>>,
+    dark: AtomicU64,
     even: AtomicU64,
     smooth: AtomicU64,
     half_shadows: AtomicU64,
@@ -101,6 +102,8 @@ pub struct RayCaster<'a, B: Basis = Haar> {
 /// What pixels were spared: most of those that see one polygon need fewer rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Spared {
+    /// Those of scenes in which nothing shines: no ray is needed to see that.
+    pub dark_pixels: u64,
     /// Those for which no ray looked for edges.
     pub even_pixels: u64,
     /// Those that have one ray, in their middle, as they differ little from those beside them.
@@ -188,6 +191,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             glowing,
             lights,
             ends: (mode != Mode::Distributions && solution.elements.nodes[0].active).then(|| Ends::new(solution)),
+            dark: AtomicU64::new(0),
             even: AtomicU64::new(0),
             smooth: AtomicU64::new(0),
             half_shadows: AtomicU64::new(0),
@@ -226,15 +230,20 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// What the pixels of all pictures so far did without.
     #[must_use]
     pub fn spared(&self) -> Spared {
-        let counts = [&self.even, &self.smooth, &self.half_shadows, &self.exact_shadows];
-        let [even_pixels, smooth_pixels, half_shadows, exact_shadows] =
+        let counts = [&self.dark, &self.even, &self.smooth, &self.half_shadows, &self.exact_shadows];
+        let [dark_pixels, even_pixels, smooth_pixels, half_shadows, exact_shadows] =
             counts.map(|count| count.load(Ordering::Relaxed));
         let known_ends = self.ends.as_ref().map_or(0, Ends::spared);
-        Spared { even_pixels, smooth_pixels, half_shadows, exact_shadows, known_ends }
+        Spared { dark_pixels, even_pixels, smooth_pixels, half_shadows, exact_shadows, known_ends }
     }
 
     /// To be printed or not: rays by which a print has less noise do not enter the image.
     fn expose(&self, camera: &Camera, printed: bool, watch: &(dyn Fn(f32) + Sync)) -> Film {
+        if self.scene.is_dark() {
+            let image = Image::new(camera.width, camera.height);
+            self.dark.fetch_add(image.pixels.len() as u64, Ordering::Relaxed);
+            return Film::new(image, Vec::new());
+        }
         if self.mode == Mode::Gather {
             let paths = (self.grid * self.grid * GATHERED).next_power_of_two();
             return self.tracer.render_until(self, camera, paths, 0, watch).0;

@@ -78,6 +78,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times, spared: Spared)
             "unseen_vertices": skipped.unseen_vertices,
             "unseen_leaves": skipped.unseen_leaves,
             "joined_leaves": skipped.joined_leaves,
+            "dark_pixels": spared.dark_pixels,
             "even_pixels": spared.even_pixels,
             "smooth_pixels": spared.smooth_pixels,
             "half_shadows": spared.half_shadows,

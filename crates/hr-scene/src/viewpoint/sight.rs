@@ -17,6 +17,10 @@ const UNLIT: f64 = 0.1;
 const LAMP: f64 = 0.5;
 /// What is this near the eye, as a share of the distance to what is looked at, is worth half: wide views are better.
 const NEAR: f64 = 1.0;
+/// Where no lamp is, light comes from everywhere: a place is lit that sees out in one of these directions, x and y of unit vectors about
+/// its normal.
+const OUTWARD: [[f32; 2]; 7] =
+    [[0.0, 0.0], [0.7, 0.0], [0.35, 0.61], [-0.35, 0.61], [-0.7, 0.0], [-0.35, -0.61], [0.35, -0.61]];
 /// Rays begin and end this far from surfaces, unit space.
 const GAP: f32 = 1e-5;
 
@@ -90,8 +94,13 @@ impl<'a> Sight<'a> {
     /// two-sided one where there is light. Otherwise it is the inside of a solid, or nothing.
     pub(super) fn wall(&self, origin: DVec3, direction: DVec3) -> Option<DVec3> {
         let hit = self.hit(origin, direction)?;
-        let room = hit.front || !self.lamps.is_empty() && self.shows(&hit);
+        let room = hit.front || self.has_lamps() && self.shows(&hit);
         room.then(|| self.normalization.to_scene(hit.point))
+    }
+
+    /// Whether there is a lamp, seen or not.
+    pub(super) fn has_lamps(&self) -> bool {
+        !self.lamps.is_empty()
     }
 
     /// How much of a picture shows what is lit, and not too near: 0…1.
@@ -131,10 +140,17 @@ impl<'a> Sight<'a> {
         (hit.front || material.two_sided) && !is_black || emits
     }
 
-    /// Whether a lamp reaches what was hit directly.
+    /// Whether a lamp reaches what was hit directly, or without lamps the sky.
     fn lit(&self, hit: &Hit, direction: Vec3) -> bool {
         let normal = if hit.normal.dot(direction) < 0.0 { hit.normal } else { -hit.normal };
         let from = hit.point + normal * GAP;
+        if self.lamps.is_empty() {
+            let (right, ahead) = normal.any_orthonormal_pair();
+            return OUTWARD.iter().any(|[x, y]| {
+                let outward = right * *x + ahead * *y + normal * (1.0 - x * x - y * y).sqrt();
+                self.visibility.closest(from, outward, GAP, f32::MAX).is_none()
+            });
+        }
         self.lamps.iter().any(|lamp| {
             let (to, reach) = match *lamp {
                 Lamp::Face(point, facing) if facing.dot(from - point) <= 0.0 => return false,

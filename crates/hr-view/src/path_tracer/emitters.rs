@@ -12,7 +12,7 @@ use hr_diffuse::form_factor::{point_to_sphere, point_to_surface};
 use hr_diffuse::visibility::{Occluders, Patch};
 use hr_diffuse::{Domain, Geometry, Light, LightKind, Normalization, Rgb, Shape, Surface};
 use hr_scene::Scene;
-use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
 /// Farther than anything in the unit cube is from anything else in it.
 const FAR: f32 = 2.0;
@@ -412,6 +412,12 @@ impl Emitters {
         match &self.entries[entry as usize].source {
             Source::Surface(glow) => {
                 let geometry = &geometries[glow.surface as usize];
+                let is_within = |(center, radius): (Vec3, f32)| at.distance(center) < radius;
+                let is_sky = glow.domain == Domain::WHOLE && !geometry.is_convex(glow.back);
+                if is_sky && geometry.sphere().is_some_and(is_within) {
+                    // All around: all that is above both horizons counts.
+                    return Some(glow.radiance * (FRAC_PI_2 * (1.0 + n.dot(true_normal))));
+                }
                 let mut corners = geometry.corners(glow.domain).into_iter();
                 if !geometry.is_polygon() || !corners.all(|uv| above(geometry.point(uv), 0.0)) {
                     return None;

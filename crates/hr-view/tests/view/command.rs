@@ -284,6 +284,41 @@ fn what_is_black_for_want_of_light_is_told() {
     }
 }
 
+/// A convex thing of reflectance ρ under a sky of radiance L reflects ρ L everywhere, and beside it is the sky.
+#[test]
+fn a_sky_shines_on_what_stands_in_the_open() {
+    let folder = Folder::new("sky");
+    let corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n";
+    let faces = "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    folder.write("grey.mtl", "newmtl grey\nKd 0.5 0.25 0.125\n");
+    let cube = folder.write("cube.obj", &format!("mtllib grey.mtl\nusemtl grey\n{corners}{faces}"));
+    let (pfm, stats) = (folder.path("a.pfm"), folder.path("a.json"));
+    let text = succeeds(&[&cube, "--sky", "2", "--image", &pfm, "--stats", &stats]);
+    assert!(!text.contains("nothing in the scene shines"), "{text}");
+    let (_, _, channels) = read_pfm(&pfm);
+    let (mut cube_pixels, mut sky_pixels) = (0, 0);
+    for pixel in channels.chunks_exact(3) {
+        let is = |color: [f32; 3]| pixel.iter().zip(color).all(|(is, should)| (is / should - 1.0).abs() < 0.01);
+        cube_pixels += usize::from(is([1.0, 0.5, 0.25]));
+        sky_pixels += usize::from(is([2.0; 3]));
+    }
+    let pixels = channels.len() / 3;
+    assert!(cube_pixels > pixels / 10 && sky_pixels > pixels / 4, "{cube_pixels} and {sky_pixels} of {pixels}");
+    assert!(cube_pixels + sky_pixels > pixels * 97 / 100, "but for edges: {cube_pixels} and {sky_pixels} of {pixels}");
+    for wrong in ["0", "-1", "nan", "bright"] {
+        let output = hr_view(&[&cube, "--sky", wrong, "--image", &pfm]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{wrong}: {text}");
+        assert!(text.contains("must be a radiance above 0"), "{text}");
+    }
+    // Nothing is looked for where nothing shines.
+    succeeds(&[&cube, "--image", &pfm, "--stats", &stats]);
+    let text = std::fs::read_to_string(&stats).expect("written");
+    let stats: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(stats["skipped"]["dark_pixels"].as_u64(), Some(pixels as u64), "{text}");
+    assert!(read_pfm(&pfm).2.iter().all(|&channel| channel == 0.0), "it is black");
+}
+
 #[test]
 fn a_time_budget_ends_soon() {
     let folder = Folder::new("budget");
