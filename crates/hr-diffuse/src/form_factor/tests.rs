@@ -275,9 +275,6 @@ fn the_inside_of_a_sphere_sends_evenly() {
         [(Vec3::splat(0.5), Vec3::X), (Vec3::new(0.9, 0.4, 0.6), Vec3::Z), (Vec3::new(0.2, 0.2, 0.3), -Vec3::Y)]
     {
         assert_eq!(point_to_surface(&sphere, &Domain::WHOLE, false, x, n), 1.0, "{x}");
-        let sum: f32 = parts.iter().map(|part| point_to_surface(&sphere, part, false, x, n)).sum();
-        // What is bent has no closed form in parts.
-        assert!((sum - 1.0).abs() < 0.01, "{x}: its parts sum to {sum}");
     }
 }
 
