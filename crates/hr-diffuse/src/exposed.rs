@@ -65,9 +65,12 @@ pub(crate) fn is_dark(scene: &SceneData, elements: &Elements, side: Side) -> boo
 /// Whether part of a side may be covered by a surface that touches it.
 pub(crate) fn is_touched(scene: &SceneData, elements: &Elements, side: Side) -> bool {
     let geometry = &scene.surfaces()[(side / 2) as usize];
-    let bounds = geometry.bounds(Domain::WHOLE).padded(TOUCHING);
+    let bounds = geometry.bounds(Domain::WHOLE);
+    // What is farther away than a surface is large covers none of it by touching it: in meshes far finer than the scene is wide there is much.
+    let touching = (bounds.max - bounds.min).length().clamp(2.0 * ASIDE, TOUCHING);
+    let bounds = bounds.padded(touching);
     let region = match plane(geometry, side) {
-        Some((normal, height)) => Region { bounds, normal, heights: [height + ASIDE, height + TOUCHING] },
+        Some((normal, height)) => Region { bounds, normal, heights: [height + ASIDE, height + touching] },
         None => Region { bounds, normal: Vec3::ZERO, heights: [f32::NEG_INFINITY, f32::INFINITY] },
     };
     scene.visibility.any_in(&region, |other| {
