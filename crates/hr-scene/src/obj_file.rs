@@ -40,7 +40,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 pub(crate) fn from_bytes(bytes: &[u8], path: &Path) -> Result<Scene, SceneError> {
     let mut warnings = Warnings::default();
     let mut reader = Reader::new(path);
-    for (line, statement) in statements(&String::from_utf8_lossy(bytes)) {
+    for (line, statement) in statements(&whole_file::text(bytes)) {
         reader.statement(line, &statement, &mut warnings)?;
     }
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();

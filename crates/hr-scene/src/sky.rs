@@ -1,6 +1,7 @@
 //! A sky, for what stands in the open, and for scenes that bring no light.
 
 use crate::reflectors::phong;
+use crate::viewpoint::shape_bounds;
 use crate::{Material, Rgb, Scene, SceneError};
 use glam::DVec3;
 use hr_diffuse::{Shape, Surface};
@@ -37,6 +38,20 @@ impl Scene {
     }
 }
 
+impl Scene {
+    /// How far it is across all there is, in scene units, but for skies: spheres that shine inward. 0 where nothing else is there.
+    #[must_use]
+    pub fn extent(&self) -> f64 {
+        let is_sky = |surface: &Surface| {
+            matches!(surface.shape, Shape::Sphere { .. })
+                && surface.flip
+                && self.materials.get(surface.material as usize).is_some_and(|m| m.exitance != Rgb::ZERO)
+        };
+        let bounds = self.surfaces.iter().filter(|surface| !is_sky(surface)).map(|s| shape_bounds(&s.shape));
+        bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).map_or(0.0, |(low, high)| (high - low).length())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -49,10 +64,12 @@ mod tests {
         let far = Camera { eye: [1e3, 2e3, -3e3], ..camera };
         scene.cameras.push(("far".into(), far));
         let (low, high) = scene.bounds().expect("surfaces");
-        let surfaces = scene.surfaces.len();
+        let (surfaces, extent) = (scene.surfaces.len(), scene.extent());
+        assert!((extent / (high - low).length() - 1.0).abs() < 1e-12, "{extent} across {low} {high}");
         scene.add_sky(Rgb::new(1.0, 2.0, 3.0)).expect("there are surfaces");
         let scene = scene.finish().expect("it is sound");
         assert_eq!(scene.surfaces.len(), surfaces + 1, "one surface");
+        assert_eq!(scene.extent(), extent, "a sky is no place to walk to");
         let sky = &scene.surfaces[surfaces];
         let Shape::Sphere { center, radius } = sky.shape else { panic!("{sky:?}") };
         assert!(sky.flip, "its front is inside");

@@ -348,7 +348,8 @@ fn sphere_directions(count: u32) -> impl Iterator<Item = DVec3> {
     })
 }
 
-fn shape_bounds(shape: &Shape) -> (DVec3, DVec3) {
+/// Smallest and largest coordinates, of curved surfaces other than spheres a little wide.
+pub(crate) fn shape_bounds(shape: &Shape) -> (DVec3, DVec3) {
     let of = |points: &[DVec3], pad: f64| {
         let low = points.iter().copied().reduce(DVec3::min).unwrap_or_default();
         let high = points.iter().copied().reduce(DVec3::max).unwrap_or_default();

@@ -26,6 +26,20 @@ pub(crate) fn read_whole(path: &Path) -> Result<Vec<u8>, SceneError> {
     read(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })
 }
 
+/// The text of a file: UTF-8, or UTF-16 where it begins with that mark, without the mark. What is no text becomes U+FFFD: it can only stand
+/// in names and comments.
+pub(crate) fn text(bytes: &[u8]) -> String {
+    let units = |bytes: &[u8], unit: fn([u8; 2]) -> u16| -> Vec<u16> {
+        bytes.chunks(2).map(|pair| unit([pair[0], *pair.get(1).unwrap_or(&0)])).collect()
+    };
+    match bytes {
+        [0xef, 0xbb, 0xbf, bytes @ ..] => String::from_utf8_lossy(bytes).into_owned(),
+        [0xff, 0xfe, bytes @ ..] => String::from_utf16_lossy(&units(bytes, u16::from_le_bytes)),
+        [0xfe, 0xff, bytes @ ..] => String::from_utf16_lossy(&units(bytes, u16::from_be_bytes)),
+        _ => String::from_utf8_lossy(bytes).into_owned(),
+    }
+}
+
 /// A regular file, opened to be read, and its length in bytes.
 ///
 /// # Errors

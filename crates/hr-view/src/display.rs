@@ -169,6 +169,11 @@ pub trait Walkable: Send + Sync {
     /// Everything that does not follow the eye. Must not change while it is shown.
     fn mesh(&self) -> &DisplayMesh;
 
+    /// How far it is across what one walks through, scene units.
+    fn extent(&self) -> f64 {
+        self.mesh().diagonal().into()
+    }
+
     /// Named cameras, in the order of the digit keys; may be empty.
     fn cameras(&self) -> &[(String, Camera)];
 

@@ -59,6 +59,8 @@ struct Facts<'a> {
     /// What each of them needs beside the first one's exposure.
     exposures: Vec<f32>,
     up: [f64; 3],
+    /// How far it is across what one walks through.
+    extent: f64,
     origin: [f64; 3],
     lattice: Lattice,
     to_srgb: [f32; 9],
@@ -127,6 +129,7 @@ fn solution(solved: &Solved, mesh: &DisplayMesh, sources: &[Source], out: &mut i
         cameras,
         exposures: exposures.iter().map(|exposure| exposure / tone.exposure).collect(),
         up: up_of(&solved.scene.cameras).to_array(),
+        extent: solved.scene.extent(),
         origin: mesh.origin.to_array(),
         lattice,
         to_srgb: tone.to_srgb.to_cols_array(),

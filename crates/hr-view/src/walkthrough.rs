@@ -112,6 +112,10 @@ impl Walkable for Walkthrough {
         &self.mesh
     }
 
+    fn extent(&self) -> f64 {
+        self.solved.scene.extent()
+    }
+
     fn cameras(&self) -> &[(String, Camera)] {
         &self.solved.scene.cameras
     }

@@ -1,5 +1,6 @@
 //! From bytes to statements: lines, continuations, words, and which `xf` closes which.
 
+use crate::whole_file;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -26,10 +27,9 @@ pub(super) struct File {
 }
 
 impl File {
-    /// Cuts a file into statements. What is not UTF-8 becomes U+FFFD: it can only stand in names and comments.
+    /// Cuts a file into statements.
     pub(super) fn new(path: PathBuf, bytes: &[u8]) -> Self {
-        let text = String::from_utf8_lossy(bytes);
-        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        let text = whole_file::text(bytes);
         let mut file = Self {
             path,
             statements: Vec::new(),

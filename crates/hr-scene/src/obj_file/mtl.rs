@@ -4,6 +4,7 @@ use super::{number, statements};
 use crate::reflectors::{metallic_roughness, phong};
 use crate::texture::{Texture, Wrap, decode};
 use crate::warnings::Warnings;
+use crate::whole_file;
 use crate::{Material, SceneError};
 use glam::{Mat3, Vec2};
 use glossy_ext::{Reflector, Rgb};
@@ -46,7 +47,7 @@ impl Library {
     /// Adds the materials of a library; a name that is known already is given its new meaning.
     pub(super) fn read(&mut self, bytes: &[u8], path: &Path, warnings: &mut Warnings) -> Result<(), SceneError> {
         let first = self.materials.len();
-        for (line, statement) in statements(&String::from_utf8_lossy(bytes)) {
+        for (line, statement) in statements(&whole_file::text(bytes)) {
             let place = || format!("{}:{line}", path.display());
             let mut words = statement.split_whitespace();
             let Some(keyword) = words.next() else {
@@ -198,7 +199,7 @@ fn texture(rest: &str, path: &Path, place: impl Fn() -> String, warnings: &mut W
         rest = tail;
     }
     let file = path.parent().unwrap_or(Path::new("")).join(rest.replace('\\', "/"));
-    let decoded = crate::whole_file::read(&file).map_err(|e| e.to_string()).and_then(|bytes| decode(&bytes, true));
+    let decoded = whole_file::read(&file).map_err(|e| e.to_string()).and_then(|bytes| decode(&bytes, true));
     match decoded {
         Ok((texels, halved)) => {
             if halved {

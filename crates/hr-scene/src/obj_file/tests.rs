@@ -35,6 +35,20 @@ fn close(a: Rgb, b: [f32; 3]) -> bool {
 }
 
 #[test]
+fn text_is_read_by_its_mark() {
+    let text = format!("o \u{fc}bung\n{SQUARE}f 1 2 3 4\n");
+    let plain = parse(&text);
+    let marked = format!("\u{feff}{text}");
+    let units: Vec<u16> = marked.encode_utf16().collect();
+    let little = units.iter().flat_map(|unit| unit.to_le_bytes()).collect();
+    let big = units.iter().flat_map(|unit| unit.to_be_bytes()).collect();
+    for bytes in [marked.into_bytes(), little, big] {
+        let scene = from_bytes(&bytes, Path::new("no folder/small.obj")).expect("valid");
+        assert_eq!((scene.surfaces, scene.warnings), (plain.surfaces.clone(), plain.warnings.clone()), "{bytes:?}");
+    }
+}
+
+#[test]
 fn quadrilaterals_stay_and_triangle_pairs_merge() {
     for faces in ["f 1 2 3 4", "f 1 2 3\nf 1 3 4", "f -4 -3 -2 -1", "f 1 2 \\\n 3 4 # a comment"] {
         let scene = parse(&format!("{SQUARE}{faces}\n"));

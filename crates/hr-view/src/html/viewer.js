@@ -50,7 +50,7 @@ class Viewer {
     this.facts = facts;
     this.resize();
     this.picture = new Picture(this.canvas, scene);
-    this.walker = new Walker(facts, this.picture.diagonal);
+    this.walker = new Walker(facts);
     this.pointers = new Map();
     this.stops = 0;
     // What the camera gone to last needs beside the first one's exposure, which is in the light already.

@@ -12,7 +12,7 @@ const unit = (a, otherwise = [0, 0, 0]) => {
 const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 const perpendicular = (a) => unit(cross(a, Math.abs(a[0]) < 0.7 ? [1, 0, 0] : [0, 1, 0]));
 
-// Time to cross the scene's diagonal at the initial speed, in seconds.
+// Time to cross the scene at the initial speed, in seconds.
 const CROSSING = 8;
 // Speed per notch of the mouse wheel.
 const SPEED_STEP = 1.25;
@@ -32,9 +32,9 @@ const MOTIONS = {
 };
 
 class Walker {
-  constructor(facts, diagonal) {
+  constructor(facts) {
     this.up = facts.up;
-    this.pace = diagonal > 0 ? diagonal / CROSSING : 1;
+    this.pace = facts.extent > 0 ? facts.extent / CROSSING : 1;
     this.notches = 0;
     this.held = new Set();
   }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use std::time::Duration;
 use winit::keyboard::KeyCode;
 
-/// Time to cross the scene's diagonal at the initial speed, in seconds.
+/// Time to cross the scene at the initial speed, in seconds.
 const CROSSING: f64 = 8.0;
 
 /// Speed per notch of the mouse wheel.
@@ -77,8 +77,8 @@ impl Walker {
         self.up = walk.up().try_normalize().unwrap_or(DVec3::Z);
         let (low, high) = mesh.bounds();
         let (low, high) = (mesh.origin + low.as_dvec3(), mesh.origin + high.as_dvec3());
-        let diagonal = (high - low).length();
-        self.pace = if diagonal > 0.0 { diagonal / CROSSING } else { 1.0 };
+        let extent = walk.extent();
+        self.pace = if extent > 0.0 { extent / CROSSING } else { 1.0 };
         if from_start {
             self.view = match walk.cameras().first() {
                 Some((_, camera)) => View::of_camera(camera),
