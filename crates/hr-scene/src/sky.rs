@@ -1,7 +1,7 @@
 //! A sky, for what stands in the open, and for scenes that bring no light.
 
 use crate::reflectors::phong;
-use crate::viewpoint::shape_bounds;
+use crate::viewpoint::bounds_of;
 use crate::{Material, Rgb, Scene, SceneError};
 use glam::DVec3;
 use hr_diffuse::{Shape, Surface};
@@ -36,9 +36,7 @@ impl Scene {
         self.leave_out_vanishing();
         Ok(())
     }
-}
 
-impl Scene {
     /// How far it is across all there is, in scene units, but for skies: spheres that shine inward. 0 where nothing else is there.
     #[must_use]
     pub fn extent(&self) -> f64 {
@@ -47,8 +45,8 @@ impl Scene {
                 && surface.flip
                 && self.materials.get(surface.material as usize).is_some_and(|m| m.exitance != Rgb::ZERO)
         };
-        let bounds = self.surfaces.iter().filter(|surface| !is_sky(surface)).map(|s| shape_bounds(&s.shape));
-        bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).map_or(0.0, |(low, high)| (high - low).length())
+        let bounds = bounds_of(self.surfaces.iter().filter(|surface| !is_sky(surface)));
+        bounds.map_or(0.0, |(low, high)| (high - low).length())
     }
 }
 

@@ -5,7 +5,7 @@ mod sight;
 use crate::camera::unit;
 use crate::{Camera, Scene};
 use glam::DVec3;
-use hr_diffuse::Shape;
+use hr_diffuse::{Shape, Surface};
 use sight::Sight;
 use std::f64::consts::{PI, TAU};
 
@@ -33,7 +33,7 @@ impl Scene {
     /// wide for other curved surfaces.
     #[must_use]
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        self.surfaces.iter().map(|s| shape_bounds(&s.shape)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+        bounds_of(&self.surfaces)
     }
 
     /// Which way is up: that of the first camera; else +y for glTF files, which say so; else (MGF, OBJ: their files do
@@ -348,8 +348,13 @@ fn sphere_directions(count: u32) -> impl Iterator<Item = DVec3> {
     })
 }
 
-/// Smallest and largest coordinates, of curved surfaces other than spheres a little wide.
-pub(crate) fn shape_bounds(shape: &Shape) -> (DVec3, DVec3) {
+/// Smallest and largest coordinates of some surfaces; `None` without any.
+pub(crate) fn bounds_of<'a>(surfaces: impl IntoIterator<Item = &'a Surface>) -> Option<(DVec3, DVec3)> {
+    surfaces.into_iter().map(|s| shape_bounds(&s.shape)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
+/// Those of one, of curved ones other than spheres a little wide.
+fn shape_bounds(shape: &Shape) -> (DVec3, DVec3) {
     let of = |points: &[DVec3], pad: f64| {
         let low = points.iter().copied().reduce(DVec3::min).unwrap_or_default();
         let high = points.iter().copied().reduce(DVec3::max).unwrap_or_default();
@@ -371,7 +376,6 @@ mod tests {
     use crate::builtin::tests::grey;
     use crate::{Material, builtin};
     use glossy_ext::Lambert;
-    use hr_diffuse::Surface;
     use std::sync::Arc;
 
     fn without_cameras(name: &str) -> Scene {
