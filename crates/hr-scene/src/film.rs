@@ -12,6 +12,9 @@ use crate::{ImageKind, SceneError, ToneMap};
 use glam::DVec3;
 use std::path::Path;
 
+/// Surfaces look alike in a pixel that differ by no more than this share of its mean.
+const ALIKE: f32 = 0.05;
+
 /// What a pixel sees of one surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Part {
@@ -78,6 +81,12 @@ impl Pixel {
     #[must_use]
     pub fn has_edge(&self) -> bool {
         self.parts.len() > 1
+    }
+
+    /// Whether the surfaces that it sees look different.
+    #[must_use]
+    pub fn has_contrast(&self) -> bool {
+        Self::contrast(&std::iter::once(self)) > ALIKE
     }
 
     /// By how much the surfaces that pixels see differ, in terms of the mean of all: the channel where that is most. Nothing where

@@ -16,7 +16,6 @@ use hr_diffuse::visibility::Patch;
 use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
 use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
 use rayon::prelude::*;
-use smallvec::SmallVec;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -29,7 +28,7 @@ mod sight;
 
 use ends::Ends;
 use lights::Lights;
-use shared::{CORNERS, FIRST_LOBE_RAYS, LOBE_RAYS, Shaded, Shared, corners_first};
+use shared::{CORNERS, FIRST_LOBE_RAYS, Findings, LOBE_RAYS, Lobes, Shaded, Shared, corners_first};
 use sight::Sight;
 
 /// Mirrors in mirrors end here, and lobes in lobes.
@@ -42,8 +41,6 @@ const MOST_AT_EDGES: u32 = 10;
 /// A quarter of these rays comes first. Where they and the pixel's own meet one surface, the edge is beside the pixel, and what they may have
 /// missed is too small to show, unless surfaces differ by more than so many times the mean, as lamps do.
 const PLAIN: f32 = 2.0;
-/// Pixels are printed surface by surface where these differ by more than this share of the mean.
-const ALIKE: f32 = 0.05;
 /// A pixel that sees one polygon has one ray, unless it and such ones around it differ by more than this share of their mean.
 const SMOOTH: f32 = 0.05;
 /// Rows of pixels that are done together.
@@ -58,6 +55,11 @@ const NOISE_ROUNDS: u8 = 8;
 const GATHERED: u32 = 7;
 /// A path ends where a ray stands for at least so many times the leaf that it meets; else one would see the elements.
 const WIDE: f32 = 16.0;
+/// A ray in a lobe ends at a leaf that the lobe covers: its width (standard deviation) there is at least so many times the leaf's radius.
+/// What distributions blur is then less than what the lobe does, …
+const COVERS: f32 = 1.0;
+/// … and no more of its light comes back than this share: where all is polished distributions may be off by a tenth, if by much less elsewhere.
+const COMES_BACK: f32 = 0.3;
 /// Parts of surfaces glow that reflect more than so many times the mean radiance, as shades around bulbs do: rays that happen to meet
 /// them would be noise, so light is drawn from them. Of these, those with most power.
 const GLOWING: f32 = 4.0;
@@ -82,8 +84,10 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     mode: Mode,
     /// Rays per pixel are this squared.
     grid: u32,
-    /// Lobes narrower than this (radians) are followed by rays.
+    /// Lobes narrower than this (radians) are followed by rays, …
     followed: f32,
+    /// … which end at leaves whose radius is so many times less than the lobe is wide there.
+    covers: f32,
     /// For final gathers, for what is in lobes that are followed, and for the light of emitters.
     tracer: PathTracer<'a>,
     /// Nodes that glow, rising.
@@ -97,6 +101,7 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     smooth: AtomicU64,
     half_shadows: AtomicU64,
     exact_shadows: AtomicU64,
+    covered_ends: AtomicU64,
 }
 
 /// What pixels were spared: most of those that see one polygon need fewer rays.
@@ -113,6 +118,8 @@ pub struct Spared {
     /// Rays of pixels that met a place where all is known that may hide emitters: what is seen of these was cut out, and no ray sent to
     /// them.
     pub exact_shadows: u64,
+    /// Rays in lobes that ended where they would have gone on in another lobe, as the first one covers the leaf that they met.
+    pub covered_ends: u64,
     /// Rays in lobes that ended at a leaf whose light no link had asked for, but one of these rays before.
     pub known_ends: u64,
 }
@@ -151,10 +158,27 @@ struct Wanted {
     plain: bool,
 }
 
+/// What is seen in a pixel, and what its rays found out that others go on with.
+#[derive(Clone, Debug, Default)]
+struct Seen {
+    pixel: Pixel,
+    found: Findings,
+}
+
+/// What the rays of a pixel are drawn by.
+fn seed([x, y]: [usize; 2]) -> u32 {
+    hash(x as u32, y as u32 ^ 0x6b43)
+}
+
 /// Rounds of rays that make a print of a pixel less noisy.
 fn rounds(pixel: &Pixel) -> u8 {
     let times = (pixel.noise() / NOISE).powi(2);
     (times.ceil() - 1.0).clamp(0.0, f32::from(NOISE_ROUNDS)) as u8
+}
+
+/// Those that a pixel has, of rows of `width` pixels: as many as any of those around it asks for.
+fn rounds_around(wanted: &[Wanted], (width, rows): (usize, Range<usize>), at: usize) -> u8 {
+    around(width, rows, at % width, at / width).map(|i| wanted[i].rounds).max().unwrap_or(0)
 }
 
 /// By how much radiances differ, in terms of their mean: the channel where that is most.
@@ -187,6 +211,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             mode,
             grid: 3,
             followed: f32::INFINITY,
+            covers: COVERS,
             tracer,
             glowing,
             lights,
@@ -196,6 +221,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             smooth: AtomicU64::new(0),
             half_shadows: AtomicU64::new(0),
             exact_shadows: AtomicU64::new(0),
+            covered_ends: AtomicU64::new(0),
         }
     }
 
@@ -230,11 +256,16 @@ impl<'a, B: Basis> RayCaster<'a, B> {
     /// What the pixels of all pictures so far did without.
     #[must_use]
     pub fn spared(&self) -> Spared {
-        let counts = [&self.dark, &self.even, &self.smooth, &self.half_shadows, &self.exact_shadows];
-        let [dark_pixels, even_pixels, smooth_pixels, half_shadows, exact_shadows] =
-            counts.map(|count| count.load(Ordering::Relaxed));
-        let known_ends = self.ends.as_ref().map_or(0, Ends::spared);
-        Spared { dark_pixels, even_pixels, smooth_pixels, half_shadows, exact_shadows, known_ends }
+        let load = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        Spared {
+            dark_pixels: load(&self.dark),
+            even_pixels: load(&self.even),
+            smooth_pixels: load(&self.smooth),
+            half_shadows: load(&self.half_shadows),
+            exact_shadows: load(&self.exact_shadows),
+            covered_ends: load(&self.covered_ends),
+            known_ends: self.ends.as_ref().map_or(0, Ends::spared),
+        }
     }
 
     /// To be printed or not: rays by which a print has less noise do not enter the image.
@@ -260,44 +291,56 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             watch(rows as f32 / (passes * camera.height) as f32);
         };
         let bands = image.pixels.par_chunks_mut(BAND * width).zip(wanted.par_chunks_mut(BAND * width));
-        let edges = bands.enumerate().flat_map_iter(|(band, (means, wanted))| {
+        let kept = bands.enumerate().flat_map_iter(|(band, (means, wanted))| {
             let first = band * BAND;
             let sight =
                 Sight::new(&self.solution.scene.visibility, (eye, &rays), 0..width, first..first + means.len() / width);
-            let pixels = self.band(&sight, wanted, &tell);
-            means.iter_mut().zip(&pixels).for_each(|(mean, pixel)| *mean = pixel.radiance());
-            let is_printed = move |pixel: &Pixel| printed && Pixel::contrast(&std::iter::once(pixel)) > ALIKE;
-            let place = move |(at, pixel): (usize, Pixel)| is_printed(&pixel).then_some((first * width + at, pixel));
-            pixels.into_iter().enumerate().filter_map(place)
+            let all = self.band(&sight, wanted, &tell);
+            means.iter_mut().zip(&all).for_each(|(mean, seen)| *mean = seen.pixel.radiance());
+            let wanted = &*wanted;
+            let is_noisy = move |at| rounds_around(wanted, (width, 0..wanted.len() / width), at) > 0;
+            let is_kept = move |at, seen: &Seen| printed && (seen.pixel.has_contrast() || is_noisy(at));
+            let place = move |(at, seen)| is_kept(at, &seen).then_some((first * width + at, seen));
+            all.into_iter().enumerate().filter_map(place)
         });
-        let edges: Vec<_> = edges.collect();
+        let kept: Vec<(usize, Seen)> = kept.collect();
         let rows = if printed { height } else { 0 };
         let noisy = (0..rows).into_par_iter().flat_map_iter(|y| {
-            let (wanted, tell) = (&wanted, &tell);
+            let (wanted, kept, tell) = (&wanted, &kept, &tell);
             let mut shared = Shared::of(rays.pixel());
             let row = move |x: usize| {
-                let rounds = around(width, 0..height, x, y).map(|i| wanted[i].rounds).max().unwrap_or(0);
+                let at = y * width + x;
+                let rounds = rounds_around(wanted, (width, 0..height), at);
                 if x + 1 == width {
                     tell();
                 }
                 (rounds > 0).then(|| {
                     let sight = Sight::new(&self.solution.scene.visibility, (eye, &rays), x..x + 1, y..y + 1);
-                    let mut pixel = self.pixel(&sight, [x, y], u32::from(rounds), &mut shared);
-                    self.cover(&sight, [x, y], wanted[y * width + x], &mut pixel, &mut shared);
-                    (y * width + x, pixel)
+                    let mut seen = match kept.binary_search_by_key(&at, |(at, _)| *at) {
+                        Ok(index) => kept[index].1.clone(),
+                        // Those that do not know of noise in the next band.
+                        Err(_) => {
+                            let mut seen = self.pixel(&sight, [x, y], &mut shared);
+                            self.cover(&sight, [x, y], wanted[at], &mut seen.pixel, &mut shared);
+                            seen
+                        }
+                    };
+                    self.go_on(&sight, [x, y], u32::from(rounds), &mut seen, &mut shared);
+                    (at, seen.pixel)
                 })
             };
             (0..width).filter_map(row)
         });
         let noisy: Vec<_> = noisy.collect();
         // Of a pixel that is both the last one counts.
-        Film::new(image, edges.into_iter().chain(noisy).collect())
+        let edges = kept.into_iter().filter(|(_, seen)| seen.pixel.has_contrast()).map(|(at, seen)| (at, seen.pixel));
+        Film::new(image, edges.chain(noisy).collect())
     }
 
     /// What is seen in rows of pixels, and what is wanted for each. How much they see of each surface is known better
     /// where those beside them differ, or have edges; were that asked of a pixel itself, what is smaller than a pixel would be too
     /// dark, as it is seen only where it was met.
-    fn band(&self, sight: &Sight<'_>, wanted: &mut [Wanted], tell: &dyn Fn()) -> Vec<Pixel> {
+    fn band(&self, sight: &Sight<'_>, wanted: &mut [Wanted], tell: &dyn Fn()) -> Vec<Seen> {
         let (mut shared, columns, rows) = (Shared::of(sight.pixel()), sight.columns(), sight.rows());
         let (width, height) = (columns.len(), rows.len());
         let place = |at: usize| [columns.start + at % width, rows.start + at / width];
@@ -307,36 +350,36 @@ impl<'a, B: Basis> RayCaster<'a, B> {
                 || around(width, 0..height, at % width, at / width).filter_map(|beside| glances[beside].as_ref());
             glances[at].as_ref().filter(|_| differ(beside().map(Pixel::radiance)) <= SMOOTH)
         };
-        let mut pixels = Vec::with_capacity(wanted.len());
+        let mut all = Vec::with_capacity(wanted.len());
         for at in 0..wanted.len() {
-            let glance = smooth(at).cloned();
+            let glance = smooth(at).map(|pixel| Seen { pixel: pixel.clone(), ..Seen::default() });
             self.smooth.fetch_add(u64::from(glance.is_some()), Ordering::Relaxed);
-            pixels.push(glance.unwrap_or_else(|| self.pixel(sight, place(at), 0, &mut shared)));
+            all.push(glance.unwrap_or_else(|| self.pixel(sight, place(at), &mut shared)));
             if (at + 1).is_multiple_of(width) {
                 tell();
             }
         }
         for (at, wanted) in wanted.iter_mut().enumerate() {
             let around = around(width, 0..height, at % width, at / width);
-            let beside = around.filter(|&other| other != at).map(|other| &pixels[other]);
+            let beside = around.filter(|&other| other != at).map(|other| &all[other].pixel);
             let contrast = Pixel::contrast(&beside);
             let side = (EDGE * contrast).powf(2.0 / 3.0).ceil() as u32;
             let has_edges = side > self.grid && !sight.is_even(place(at));
             self.even.fetch_add(u64::from(side > self.grid && !has_edges), Ordering::Relaxed);
             let side = if has_edges { side.min(MOST_AT_EDGES) as u8 } else { 0 };
-            *wanted = Wanted { rounds: rounds(&pixels[at]), side, plain: contrast <= PLAIN };
+            *wanted = Wanted { rounds: rounds(&all[at].pixel), side, plain: contrast <= PLAIN };
         }
-        for (at, (pixel, wanted)) in pixels.iter_mut().zip(wanted).enumerate() {
-            self.cover(sight, place(at), *wanted, pixel, &mut shared);
+        for (at, (seen, wanted)) in all.iter_mut().zip(wanted).enumerate() {
+            self.cover(sight, place(at), *wanted, &mut seen.pixel, &mut shared);
         }
-        pixels
+        all
     }
 
     /// Finds with a grid of rays how much a pixel sees of each surface. Light is that of the samples there are; what was not seen by
     /// them has one.
     fn cover(&self, sight: &Sight<'_>, [x, y]: [usize; 2], wanted: Wanted, pixel: &mut Pixel, shared: &mut Shared) {
         let (seed, side) = (hash(x as u32, y as u32 ^ 0x91e7), u32::from(wanted.side));
-        shared.outlined = Default::default();
+        shared.found.outlined = Default::default();
         let is_first = |i: &u32| ((i / side) | (i % side)).is_multiple_of(2);
         let all = 0..side * side;
         let firsts = side.div_ceil(2).pow(2) as usize;
@@ -367,7 +410,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             return None;
         }
         // The middle of the pixel is this ray's own.
-        (shared.middle, shared.outlined) = (Some(None), Default::default());
+        (shared.middle, shared.found.outlined) = (Some(None), Default::default());
         let mut seen = Pixel::default();
         self.add_to(&mut seen, (sight, first), direction, &Sampler::new(0, 0), shared);
         Some(seen)
@@ -382,25 +425,33 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         self.material(hit).reflector.is_diffuse() && self.solution.leaf(hit).is_none_or(is_known)
     }
 
-    /// What is seen in a pixel with some rounds of rays more than all have.
-    fn pixel(&self, sight: &Sight<'_>, [x, y]: [usize; 2], rounds: u32, shared: &mut Shared) -> Pixel {
-        let (all, seed) = (self.grid * self.grid, hash(x as u32, y as u32 ^ 0x6b43));
+    /// What is seen in a pixel by the rays that all have.
+    fn pixel(&self, sight: &Sight<'_>, [x, y]: [usize; 2], shared: &mut Shared) -> Seen {
+        let (all, seed) = (self.grid * self.grid, seed([x, y]));
         let mut pixel = Pixel::default();
         shared.begin(sight.ray([x, y], Vec2::splat(0.5)));
-        let cells = corners_first(self.grid).map(|cell| stratified(self.grid, cell, seed));
-        let mut cells = cells.collect::<SmallVec<[Vec2; 9]>>().into_iter();
-        for i in 0..all * (1 + rounds) {
-            if i == CORNERS && i < all {
+        for (i, cell) in (0..all).zip(corners_first(self.grid)) {
+            if i == CORNERS {
                 shared.judge_corners(all - CORNERS);
-            } else if i == all {
-                shared.judge();
             }
-            let sampler = Sampler::new(seed, i);
-            let within = cells.next().unwrap_or_else(|| sampler.pair(0));
-            let (_, direction) = sight.ray([x, y], within);
-            self.add_to(&mut pixel, (sight, sight.first([x, y], direction)), direction, &sampler, shared);
+            let (_, direction) = sight.ray([x, y], stratified(self.grid, cell, seed));
+            let first = sight.first([x, y], direction);
+            self.add_to(&mut pixel, (sight, first), direction, &Sampler::new(seed, i), shared);
         }
-        pixel
+        Seen { pixel, found: shared.found }
+    }
+
+    /// Goes on with some rounds of rays more than all have.
+    fn go_on(&self, sight: &Sight<'_>, [x, y]: [usize; 2], rounds: u32, seen: &mut Seen, shared: &mut Shared) {
+        let (all, seed) = (self.grid * self.grid, seed([x, y]));
+        shared.begin(sight.ray([x, y], Vec2::splat(0.5)));
+        shared.found = seen.found;
+        shared.judge();
+        for i in all..all * (1 + rounds) {
+            let sampler = Sampler::new(seed, i);
+            let (_, direction) = sight.ray([x, y], sampler.pair(0));
+            self.add_to(&mut seen.pixel, (sight, sight.first([x, y], direction)), direction, &sampler, shared);
+        }
     }
 
     /// Adds what a ray sees of the surface that it meets first.
@@ -430,7 +481,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let width = if self.mode == Mode::Distributions {
             met.reflector.lobe(met.place().local(met.away)).width
         } else {
-            self.lobe(&met).filter(|_| met.reflector.mirror() == Rgb::ZERO)?.width
+            self.lobe(&met).ok().filter(|_| met.reflector.mirror() == Rgb::ZERO)?.width
         };
         let light = self.without_rays(&met, shared);
         let cluster = self.solution.faces.standing(leaf.0);
@@ -468,16 +519,16 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let irradiance = self.irradiance(&hit, leaf, direction, bounce, sampler, shared);
         let diffuse = reflector.diffuse() * irradiance * FRAC_1_PI;
         if bounce == 0 {
-            shared.noise[0].add(diffuse.element_sum(), 1);
+            shared.found.noise[0].add(diffuse.element_sum(), 1);
         }
         if reflector.is_diffuse() {
             return diffuse;
         }
         let met = self.met(hit, leaf, direction, reflector);
         let faint = self.solution.faint[element.material as usize];
-        // Distributions blur what is seen in a lobe where a ray in another one ended.
-        let goes_on = bounce < MOST_BOUNCES
-            && (met.reflector.mirror() != Rgb::ZERO || faint == Rgb::ZERO && self.lobe(&met).is_none());
+        // Distributions blur what is seen in a lobe where a ray in another one ended, but for a wide one.
+        let is_in_lobe = || faint == Rgb::ZERO && !self.is_covered(&met, shared.lobes) && self.lobe(&met).is_err();
+        let goes_on = bounce < MOST_BOUNCES && (met.reflector.mirror() != Rgb::ZERO || is_in_lobe());
         let glossy = match self.mode {
             Mode::Distributions if bounce == 0 => self.shared(&met, shared),
             Mode::Distributions => self.interpolated(&met),
@@ -517,9 +568,9 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         }
         let (nearby, direction) = (lights.map(|lights| &lights.nearby), direction.normalize());
         let outlined = nearby.filter(|nearby| !nearby.all_outlined().is_empty()).map(|nearby| {
-            shared.outlined.even(hit).unwrap_or_else(|| {
+            shared.found.outlined.even(hit).unwrap_or_else(|| {
                 let light = self.tracer.outlined(hit, direction, nearby);
-                shared.outlined.add(hit, light);
+                shared.found.outlined.add(hit, light);
                 light
             })
         });
@@ -587,9 +638,18 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         Met { hit, leaf, normal, away, reflector }
     }
 
-    /// The lobe toward the ray's origin; none where it is followed.
-    fn lobe(&self, met: &Met) -> Option<Lobe> {
-        Some(met.reflector.lobe(met.place().local(met.away))).filter(|lobe| lobe.width >= self.followed)
+    /// The lobe toward the ray's origin: as an error where it is followed.
+    fn lobe(&self, met: &Met) -> Result<Lobe, Lobe> {
+        let lobe = met.reflector.lobe(met.place().local(met.away));
+        if lobe.width >= self.followed { Ok(lobe) } else { Err(lobe) }
+    }
+
+    /// Whether the lobes that a ray is in cover the leaf that it met, and bring little of its light.
+    fn is_covered(&self, met: &Met, lobes: Lobes) -> bool {
+        let radius = self.solution.elements.nodes[met.leaf.index()].radius;
+        let covers = lobes.width * met.hit.t >= self.covers * radius && lobes.albedo <= COMES_BACK;
+        self.covered_ends.fetch_add(u64::from(covers), Ordering::Relaxed);
+        covers
     }
 
     /// Glossy radiance from the samples that arrive at the point.
@@ -629,9 +689,11 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         if met.reflector.glossy_albedo() == Rgb::ZERO {
             return light;
         }
-        if self.lobe(met).is_none() {
+        if let Err(lobe) = self.lobe(met) {
             // Rays are split once: each of them has one to go on.
             let count = std::mem::replace(&mut shared.lobe_rays, 1);
+            let before = shared.lobes;
+            shared.lobes = before.and(lobe.width, met.reflector.glossy_albedo().max_element());
             // Where there are fewer or more of them than before, they are spread evenly among themselves.
             let dimension = if count == FIRST_LOBE_RAYS { 1 } else { 6 };
             let turns: [Vec2; LOBE_RAYS] =
@@ -644,9 +706,9 @@ impl<'a, B: Basis> RayCaster<'a, B> {
                 self.leaving(*hit, leaf, direction, bounce + 1, &sampler.apart(number), shared)
             };
             let followed = self.tracer.glossy(&met.hit, -met.away, pairs, &turns[..count], &mut beyond);
-            shared.lobe_rays = count;
+            (shared.lobe_rays, shared.lobes) = (count, before);
             if bounce == 0 {
-                shared.noise[1].add(followed.element_sum(), count);
+                shared.found.noise[1].add(followed.element_sum(), count);
             }
             return light + followed;
         }
@@ -811,9 +873,9 @@ mod tests {
         let sight = Sight::new(&data.visibility, (eye, &rays), 0..90, 0..60);
         let (mut shared, mut off, mut light, mut early) = (Shared::default(), 0.0, 0.0, 0);
         for (x, y) in (0..60).flat_map(|y| (0..90).map(move |x| (x, y))) {
-            let seen = caster.pixel(&sight, [x, y], 0, &mut shared);
+            let seen = caster.pixel(&sight, [x, y], &mut shared);
             let [quick, thorough] = [true, false].map(|plain| {
-                let mut pixel = seen.clone();
+                let mut pixel = seen.pixel.clone();
                 caster.cover(&sight, [x, y], Wanted { rounds: 0, side: SIDE, plain }, &mut pixel, &mut shared);
                 pixel
             });
@@ -828,8 +890,8 @@ mod tests {
         let mut wanted = vec![Wanted::default(); 90 * 60];
         let band = caster.band(&sight, &mut wanted, &|| ());
         let (mut off, mut light, mut most) = (0.0, 0.0, 0.0_f32);
-        for (at, pixel) in band.iter().enumerate().filter(|(at, _)| sight.is_even([at % 90, at / 90])) {
-            let full = caster.pixel(&sight, [at % 90, at / 90], 0, &mut shared).radiance();
+        for (at, Seen { pixel, .. }) in band.iter().enumerate().filter(|(at, _)| sight.is_even([at % 90, at / 90])) {
+            let full = caster.pixel(&sight, [at % 90, at / 90], &mut shared).pixel.radiance();
             let difference = (pixel.radiance() - full).abs().element_sum();
             most = most.max(difference / full.element_sum());
             (off, light) = (off + difference, light + full.element_sum());
@@ -879,9 +941,8 @@ mod tests {
         assert!(known > 300, "{known}");
     }
 
-    /// In a room of polished walls most of what is seen in a lobe is seen in another one.
-    #[test]
-    fn lobes_are_followed_in_lobes() {
+    /// A room of walls whose polish has this roughness and albedo, with a lamp, and how a camera sees it.
+    fn polished(roughness: f32, albedo: f32) -> (Arc<Scene>, Camera) {
         let quad = |corner: DVec3, a: DVec3, b: DVec3| Shape::Quad([corner, corner + a, corner + a + b, corner + b]);
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
         let walls = [(0.0 * x, x, y), (z, y, x), (0.0 * x, y, z), (x, z, y), (0.0 * x, z, x), (y, x, z)];
@@ -897,27 +958,53 @@ mod tests {
             base_color: Rgb::ONE,
         };
         let lambert = |reflectance| Arc::new(Lambert::new(Rgb::splat(reflectance)).expect("a reflectance"));
-        let polished = Ward::new(Rgb::splat(0.1), Rgb::splat(0.7), 0.05).expect("polished");
+        let polished = Ward::new(Rgb::splat(0.8 - albedo), Rgb::splat(albedo), roughness).expect("polished");
         let materials =
             vec![material(Arc::new(polished), 0.0), material(lambert(0.0), 10.0), material(lambert(0.5), 0.0)];
-        let scene = Arc::new(Scene { surfaces, materials, ..Scene::default() });
         let [eye, target, up] = [[0.2, 0.25, 0.5], [0.9, 0.8, 0.6], [0.0, 0.0, 1.0]];
         let camera = Camera { eye, target, up, fov_x: 60.0, width: 48, height: 32 };
-        let go_on = &mut |_: &_| ControlFlow::Continue(());
-        let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.1), false, go_on).expect("a sound scene");
-        let found = RayCaster::new(&scene, &solved.solution, Mode::Samples).render(&camera, &|_| ()).pixels;
-        let truth = PathTracer::new(&scene, &solved.solution.scene.visibility).render(&camera, 512, 0, &|_| ());
-        // What shines itself is left out, and all is seen in blocks of 8 × 8.
+        (Arc::new(Scene { surfaces, materials, ..Scene::default() }), camera)
+    }
+
+    /// By how much a picture of a [polished] room is off in blocks of 8 × 8 pixels, in shares of all light. What shines itself is left out.
+    fn off(found: &[Rgb], truth: &[Rgb]) -> f32 {
         let block = |pixels: &[Rgb], [x, y]: [usize; 2]| -> f32 {
             (0..64).map(|i| pixels[(y * 8 + i / 8) * 48 + x * 8 + i % 8].element_sum().min(3.0)).sum()
         };
         let (mut off, mut all) = (0.0, 0.0);
         for at in (0..24).map(|i| [i % 6, i / 6]) {
-            let [found, truth] = [&found, &truth.image.pixels].map(|pixels| block(pixels, at));
+            let [found, truth] = [found, truth].map(|pixels| block(pixels, at));
             (off, all) = (off + (found - truth).abs(), all + truth);
         }
+        off / all
+    }
+
+    /// In a room of polished walls most of what is seen in a lobe is seen in another one.
+    #[test]
+    fn lobes_are_followed_in_lobes() {
+        let (scene, camera) = polished(0.05, 0.7);
+        let go_on = &mut |_: &_| ControlFlow::Continue(());
+        let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.1), false, go_on).expect("a sound scene");
+        let found = RayCaster::new(&scene, &solved.solution, Mode::Samples).render(&camera, &|_| ());
+        let truth = PathTracer::new(&scene, &solved.solution.scene.visibility).render(&camera, 512, 0, &|_| ());
         // Where distributions end rays it is 9 %.
-        assert!(off < 0.05 * all, "{}", off / all);
+        let off = off(&found.pixels, &truth.image.pixels);
+        assert!(off < 0.05, "{off}");
+    }
+
+    /// Where a lobe covers the leaf that a ray in it met, that leaf's distribution is as good as more rays.
+    #[test]
+    fn rays_end_where_their_lobe_covers_a_leaf() {
+        let (scene, camera) = polished(0.15, 0.25);
+        let go_on = &mut |_: &_| ControlFlow::Continue(());
+        let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.05), false, go_on).expect("a sound scene");
+        let ending = RayCaster::new(&scene, &solved.solution, Mode::Samples);
+        let following = RayCaster { covers: f32::INFINITY, ..RayCaster::new(&scene, &solved.solution, Mode::Samples) };
+        let [ended, followed] = [&ending, &following].map(|caster| caster.render(&camera, &|_| ()).pixels);
+        let [ends, none] = [&ending, &following].map(|caster| caster.spared().covered_ends);
+        assert!(ends > 10_000 && none == 0, "{ends}, {none}");
+        let off = off(&ended, &followed);
+        assert!(off < 0.02, "{off}");
     }
 
     /// A ground below slats that hide all but a third of a wide lamp, as of a sky behind blinds, and how a camera sees it. Of much less that is

@@ -83,6 +83,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times, spared: Spared)
             "smooth_pixels": spared.smooth_pixels,
             "half_shadows": spared.half_shadows,
             "exact_shadows": spared.exact_shadows,
+            "covered_ends": spared.covered_ends,
             "known_ends": spared.known_ends,
             "shot_links": skipped.shot_links,
             "negligible_detail": solution.field.counters().negligible_detail(),

@@ -23,10 +23,10 @@ const DIFFUSE_RAYS: f32 = 3.0;
 pub(super) struct Shared {
     /// Rays that follow a lobe, for each of them.
     pub(super) lobe_rays: usize,
-    /// How noisy diffuse light is, and what is found along rays that follow a lobe.
-    pub(super) noise: [Spread; 2],
-    /// Light of emitters whose outlines are known, on the surface that was met last.
-    pub(super) outlined: Direct,
+    /// Those that a ray is in.
+    pub(super) lobes: Lobes,
+    /// What they found out so far.
+    pub(super) found: Findings,
     /// Saves allocations.
     pub(super) incident: Vec<Incident>,
     /// The ray through its middle, from the eye in unit space.
@@ -37,12 +37,40 @@ pub(super) struct Shared {
     pub(super) pixel: f32,
 }
 
+/// The lobes that a ray from the eye is in, one after the other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lobes {
+    /// How wide they are together (radians).
+    pub(super) width: f32,
+    /// How much of the light comes back through all of them.
+    pub(super) albedo: f32,
+}
+
+impl Lobes {
+    /// From the eye, and in mirrors.
+    pub(super) const NONE: Self = Self { width: 0.0, albedo: 1.0 };
+
+    /// These and one more.
+    pub(super) fn and(self, width: f32, albedo: f32) -> Self {
+        Self { width: self.width.hypot(width), albedo: self.albedo * albedo }
+    }
+}
+
+/// What the rays of a pixel found out.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Findings {
+    /// How noisy diffuse light is, and what is found along rays that follow a lobe.
+    pub(super) noise: [Spread; 2],
+    /// Light of emitters whose outlines are known, on the surface that was met last.
+    pub(super) outlined: Direct,
+}
+
 impl Default for Shared {
     fn default() -> Self {
         Self {
             lobe_rays: FIRST_LOBE_RAYS,
-            noise: [Spread::default(); 2],
-            outlined: Direct::default(),
+            lobes: Lobes::NONE,
+            found: Findings::default(),
             incident: Vec::new(),
             ray: Default::default(),
             middle: None,
@@ -64,12 +92,12 @@ impl Shared {
 
     /// After the corners: what the other rays need that all pixels have.
     pub(super) fn judge_corners(&mut self, others: u32) {
-        self.lobe_rays = lobe_rays_of_others(&self.noise, others);
+        self.lobe_rays = lobe_rays_of_others(&self.found.noise, others);
     }
 
     /// After these: what the rays need that some pixels have beside them.
     pub(super) fn judge(&mut self) {
-        self.lobe_rays = lobe_rays(self.noise.map(|of| of.variance()));
+        self.lobe_rays = lobe_rays(self.found.noise.map(|of| of.variance()));
     }
 }
 
