@@ -3,7 +3,7 @@
 use crate::ViewError;
 use crate::args::Args;
 use crate::camera_path::CameraPath;
-use crate::export;
+use crate::export::{self, Format};
 use crate::glossy::Mode;
 use crate::html;
 use crate::interrupt::{Interrupt, STOPPING};
@@ -41,7 +41,7 @@ enum Output {
     Image(PathBuf),
     Frames(PathBuf),
     Html(PathBuf),
-    Export(PathBuf),
+    Export(PathBuf, Format),
 }
 
 impl Output {
@@ -60,9 +60,9 @@ impl Output {
             return Ok(Self::Html(path.clone()));
         }
         if let Some(path) = &args.export {
-            export::Format::of(path)?;
+            let format = Format::of(path)?;
             has_folder(path)?;
-            return Ok(Self::Export(path.clone()));
+            return Ok(Self::Export(path.clone(), format));
         }
         if let Some(folder) = &args.frames {
             make_folder(folder)?;
@@ -71,20 +71,22 @@ impl Output {
         Ok(Self::Window)
     }
 
-    /// How glossy light is shown best in it: pixel by pixel in a single picture, or else in a way that follows the eye at little cost.
+    /// How glossy light is shown best in it: pixel by pixel in a single picture, or else in a way that follows the eye at little cost. A
+    /// table shows none.
     fn mode(&self) -> Mode {
         match self {
-            Self::Image(_) => Mode::Samples,
-            Self::Frames(_) | Self::Html(_) | Self::Export(_) | Self::Window => Mode::Distributions,
+            Self::Image(_) | Self::Export(_, Format::Csv) => Mode::Samples,
+            Self::Frames(_) | Self::Html(_) | Self::Export(..) | Self::Window => Mode::Distributions,
         }
     }
 
-    /// Where all of its pictures are taken from; `None` where that is not known before.
+    /// Where all of its pictures are taken from, a table has none; `None` where that is not known before.
     fn cameras(&self, scene: &Scene, args: &Args, path: &CameraPath) -> Option<Vec<Camera>> {
         match self {
             Self::Image(_) => Some(vec![scene.default_camera()]),
             Self::Frames(_) => Some(walk(scene, args, path, FRAMES)),
-            Self::Html(_) | Self::Export(_) | Self::Window => None,
+            Self::Export(_, Format::Csv) => Some(Vec::new()),
+            Self::Html(_) | Self::Export(..) | Self::Window => None,
         }
     }
 }
@@ -183,7 +185,7 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
     match output {
         Output::Image(file) => show.image(&file),
         Output::Html(file) => show.html(&file),
-        Output::Export(file) => show.export(&file),
+        Output::Export(file, format) => show.export(&file, format),
         Output::Frames(folder) => show.frames(&folder, &path),
         Output::Window => Ok(()),
     }
@@ -237,9 +239,9 @@ impl Show<'_> {
         self.write_stats(Spared::default())
     }
 
-    fn export(&self, path: &Path) -> Result<(), ViewError> {
+    fn export(&self, path: &Path, format: Format) -> Result<(), ViewError> {
         self.progress.at("writing the solution", 0.0);
-        export::write(self.solved, path)?;
+        export::write(self.solved, path, format)?;
         self.write_stats(Spared::default())
     }
 

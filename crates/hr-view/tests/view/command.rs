@@ -424,3 +424,23 @@ fn what_was_stopped_goes_on() {
     assert!(10 * coarse < 9 * fresh, "{coarse} elements when it was stopped, {fresh} at the end");
     assert!(10 * resumed > 9 * fresh && 9 * resumed < 10 * fresh, "{resumed} elements, {fresh} without the stop");
 }
+
+/// A table of elements needs neither light at vertices nor distributions: it is the same where they are made to be kept.
+#[test]
+fn a_table_is_made_of_elements_alone() {
+    let folder = Folder::new("table");
+    let [light, here, there, stats] =
+        ["whole.light", "here.csv", "there.csv", "stats.json"].map(|name| folder.path(name));
+    let vertices = |more: &[&str], table: &str| {
+        let command = ["glossy-sphere", "--error", "0.2", "--export", table, "--stats", &stats];
+        succeeds(&[&command, more].concat());
+        let found: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(&stats).expect("statistics")).expect("JSON");
+        let [all, unseen] = [&found["counts"]["vertices"], &found["skipped"]["unseen_vertices"]].map(|n| n.as_u64());
+        all.expect("a number") - unseen.expect("a number")
+    };
+    let [alone, kept] = [vertices(&[], &here), vertices(&["--save", &light], &there)];
+    assert!(10 * alone < kept, "{alone} vertices for a table, {kept} to be kept");
+    let [alone, kept] = [&here, &there].map(|path| std::fs::read_to_string(path).expect("a table"));
+    assert!(alone == kept, "the tables differ");
+}
