@@ -185,7 +185,7 @@ pub fn run(args: &Args) -> Result<(), ViewError> {
     match output {
         Output::Image(file) => show.image(&file),
         Output::Html(file) => show.html(&file),
-        Output::Export(file, format) => show.export(&file, format),
+        Output::Export(file, _) => show.export(&file),
         Output::Frames(folder) => show.frames(&folder, &path),
         Output::Window => Ok(()),
     }
@@ -239,9 +239,9 @@ impl Show<'_> {
         self.write_stats(Spared::default())
     }
 
-    fn export(&self, path: &Path, format: Format) -> Result<(), ViewError> {
+    fn export(&self, path: &Path) -> Result<(), ViewError> {
         self.progress.at("writing the solution", 0.0);
-        export::write(self.solved, path, format)?;
+        export::write(self.solved, path)?;
         self.write_stats(Spared::default())
     }
 

@@ -86,9 +86,9 @@ impl Format {
 /// Writes a solution, whole or not at all. But for a table its distributions have been made, and the light at all vertices is known.
 ///
 /// # Errors
-/// [`ViewError::Scene`] with `path` where it cannot be written.
-pub fn write(solved: &Solved, path: &Path, format: Format) -> Result<(), ViewError> {
-    match format {
+/// [`ViewError::Arguments`] for an unknown ending, [`ViewError::Scene`] with `path` where it cannot be written.
+pub fn write(solved: &Solved, path: &Path) -> Result<(), ViewError> {
+    match Format::of(path)? {
         Format::Csv => Ok(write_whole(path, |out| table::write(solved, out))?),
         Format::Exr => Ok(lightmap::image(solved).save(path, &ToneMap::default(), solved.scene.primaries)?),
         Format::Glb => {
