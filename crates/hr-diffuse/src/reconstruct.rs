@@ -41,6 +41,8 @@ const SAME_POINTS: u32 = 0x8103_205b;
 /// that looked wholly visible or hidden.
 const PARTIAL_SHARE: f32 = 0.002;
 const WHOLE_SHARE: f32 = 0.01;
+/// This share of what a link found hidden may be seen all the same. Such senders are looked at closely only once they are seen.
+const MAY_BE_SEEN: f32 = 0.05;
 /// Of these rays, those for what none of the leaves around sees.
 const HIDDEN_SHARE: f32 = 0.25;
 /// Where it is proved how much is seen of senders that take up this share of the view there is nothing to look around for.
@@ -259,12 +261,17 @@ fn gather_at<L: LightField>(
     let (x, n) = point_on(light.scene, light.elements, leaf, uv);
     let mut arriving: SmallVec<[Arriving; 128]> = SmallVec::new();
     let mut total: f32 = inherited.iter().map(|brought| brought.irradiance.max_element()).sum();
+    let closely = |sender: u32| light.arriving_at(x, n, sender, Detail::shown(negligible));
     let mut look = |at: usize| {
         let link = &links.all()[at];
-        let (irradiance, share) = light.arriving_at(x, n, link.sender, Detail::shown(negligible));
+        let (irradiance, share) = if link.visibility == 0.0 {
+            light.arriving_at(x, n, link.sender, Detail::carried(negligible / MAY_BE_SEEN))
+        } else {
+            closely(link.sender)
+        };
         let most = irradiance.max_element();
         if most > 0.0 {
-            total += most * link.visibility.abs().max(0.05);
+            total += most * link.visibility.abs().max(MAY_BE_SEEN);
             arriving.push(Arriving { irradiance, share, visibility: link.visibility, sender: link.sender });
         }
     };
@@ -288,7 +295,7 @@ fn gather_at<L: LightField>(
     let mut near_senders = SmallVec::new();
     // Share of the view through links of which it is proved how much they let through.
     let mut proved = 0.0;
-    for Arriving { irradiance, share: view, mut visibility, sender } in arriving {
+    for Arriving { mut irradiance, share: mut view, mut visibility, sender } in arriving {
         let share = irradiance.max_element() / total;
         let partial = visibility > 0.0 && visibility < 1.0;
         let renewed = visibility >= 0.0 && share > if partial { PARTIAL_SHARE } else { WHOLE_SHARE };
@@ -308,7 +315,11 @@ fn gather_at<L: LightField>(
             let rarer = if visibility == 0.0 && is_hidden(sender) { HIDDEN_SHARE } else { 1.0 };
             let count = ((share * RAYS).min(MOST_RAYS) * rarer).max(1.0) as u32;
             rays += count;
+            let was_hidden = visibility == 0.0;
             visibility = visibility_at(light, from, sender, (count, SAME_POINTS));
+            if was_hidden && visibility > 0.0 {
+                (irradiance, view) = closely(sender);
+            }
         }
         let group = Group::of(light, sender);
         (if known { &mut own } else { &mut kept })[group as usize] += irradiance * visibility.abs();

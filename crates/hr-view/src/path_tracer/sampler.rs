@@ -40,17 +40,15 @@ impl Sampler {
     }
 }
 
-/// Second dimension of the Sobol' sequence: its direction numbers are the rows of Pascal's triangle modulo 2.
-fn sobol(mut index: u32) -> u32 {
-    let (mut result, mut direction) = (0, 1 << 31);
-    while index != 0 {
-        if index & 1 == 1 {
-            result ^= direction;
-        }
-        index >>= 1;
-        direction ^= direction >> 1;
+/// Second dimension of the Sobol' sequence: its direction numbers are the rows of Pascal's triangle modulo 2, of which number `i` is odd
+/// at `j` where `j` has no bit that `i` lacks (Lucas's theorem). So all bits are summed that have a bit more, for each of the five
+/// bits of their places.
+fn sobol(index: u32) -> u32 {
+    let mut sum = index;
+    for (step, lower) in [(16, 0x0000_ffff), (8, 0x00ff_00ff), (4, 0x0f0f_0f0f), (2, 0x3333_3333), (1, 0x5555_5555)] {
+        sum ^= (sum >> step) & lower;
     }
-    result
+    sum.reverse_bits()
 }
 
 /// Owen scrambling: every bit is flipped by a hash of the bits above it. On reversed bits that is a permutation in
@@ -80,6 +78,15 @@ mod tests {
                 }
                 assert_eq!(boxes, [1; 64], "seed {seed}, dimension {dimension}: {columns} columns");
             }
+        }
+    }
+
+    #[test]
+    fn the_second_dimension_is_that_of_direction_numbers() {
+        for index in (0..32).map(|bit| 1 << bit).chain((0..64).map(|i| hash(i, 5))) {
+            let direction = |bit: u32| (0..bit).fold(1u32 << 31, |direction, _| direction ^ (direction >> 1));
+            let sum = (0..32).filter(|bit| index >> bit & 1 == 1).fold(0, |sum, bit| sum ^ direction(bit));
+            assert_eq!(sobol(index), sum, "{index:#x}");
         }
     }
 
