@@ -265,7 +265,7 @@ fn gather_at<L: LightField>(
     let mut look = |at: usize| {
         let link = &links.all()[at];
         let (irradiance, share) = if link.visibility == 0.0 {
-            light.arriving_at(x, n, link.sender, Detail::carried(negligible / MAY_BE_SEEN))
+            light.arriving_at(x, n, link.sender, Detail::rough())
         } else {
             closely(link.sender)
         };
@@ -533,6 +533,20 @@ mod tests {
 
     fn vertices(solver: &Solver, links: &Links) -> Vertices {
         reconstruct(solver.light(), (links, None), (0.05, &|_| true), &mut |_| ControlFlow::Continue(())).0
+    }
+
+    /// Of what links say that it is hidden, and vertices see, they gather as much as of all else.
+    #[test]
+    fn vertices_look_closely_at_what_was_hidden_and_is_seen() {
+        let solver = room();
+        let hidden = solver.links.all().iter().map(|link| Link { visibility: 0.0, ..*link });
+        let hidden = Links::new(hidden.collect(), solver.elements.nodes.len());
+        let [right, found] = [&solver.links, &hidden].map(|links| vertices(&solver, links));
+        let (mut off, mut all) = (0.0, 0.0);
+        for (right, found) in right.irradiance.iter().zip(&found.irradiance) {
+            (off, all) = (off + (found - right).abs().element_sum(), all + right.element_sum());
+        }
+        assert!(off < 0.02 * all, "off by {} of {all}", off / all);
     }
 
     /// All light but that is the lamp's own, and on the floor that is known.

@@ -64,6 +64,11 @@ impl Detail {
         Self { negligible, shown: false }
     }
 
+    /// For what is hardly seen: all senders are points that send evenly.
+    pub(crate) fn rough() -> Self {
+        Self::carried(f32::INFINITY)
+    }
+
     /// For what is seen.
     pub(crate) fn shown(negligible: f32) -> Self {
         Self { negligible, shown: true }
