@@ -14,8 +14,9 @@ use hr_diffuse::hierarchy::Kind;
 use hr_diffuse::sampling::{hash, point2};
 use hr_diffuse::visibility::Patch;
 use hr_diffuse::{Hierarchy, Hit, NodeId, Rgb, Solution};
-use hr_scene::{Camera, Film, Image, Material, Pixel, Scene};
+use hr_scene::{Camera, Film, Image, Material, Pixel, Rays, Scene};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -26,7 +27,7 @@ mod lights;
 mod shared;
 mod sight;
 
-use ends::Ends;
+use ends::{Ends, Often};
 use lights::Lights;
 use shared::{CORNERS, FIRST_LOBE_RAYS, Findings, LOBE_RAYS, Lobes, Shaded, Shared, corners_first};
 use sight::Sight;
@@ -45,6 +46,8 @@ const PLAIN: f32 = 2.0;
 const SMOOTH: f32 = 0.05;
 /// Rows of pixels that are done together.
 const BAND: usize = 8;
+/// Of so many pixels along both sides of a picture one tells which leaves end many rays.
+const PROBED: usize = 8;
 /// Where the standard error of a pixel is larger than this share of its light, there are as many more rays for a print as would
 /// make it that small, up to so many times as many. Its neighbours have as many, as some do not know how noisy they are.
 const NOISE: f32 = 0.04;
@@ -88,6 +91,8 @@ pub struct RayCaster<'a, B: Basis = Haar> {
     followed: f32,
     /// … which end at leaves whose radius is so many times less than the lobe is wide there.
     covers: f32,
+    /// Of so many pixels one way one tells which leaves end many rays.
+    probed: usize,
     /// For final gathers, for what is in lobes that are followed, and for the light of emitters.
     tracer: PathTracer<'a>,
     /// Nodes that glow, rising.
@@ -122,6 +127,8 @@ pub struct Spared {
     pub covered_ends: u64,
     /// Rays in lobes that ended at a leaf whose light no link had asked for, but one of these rays before.
     pub known_ends: u64,
+    /// Such rays where so few ended at a leaf that its light was reflected toward each of them, and into no distribution.
+    pub seldom_ends: u64,
 }
 
 /// A point that a ray met.
@@ -212,6 +219,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             grid: 3,
             followed: f32::INFINITY,
             covers: COVERS,
+            probed: PROBED,
             tracer,
             glowing,
             lights,
@@ -265,6 +273,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             exact_shadows: load(&self.exact_shadows),
             covered_ends: load(&self.covered_ends),
             known_ends: self.ends.as_ref().map_or(0, Ends::spared),
+            seldom_ends: self.ends.as_ref().map_or(0, Ends::seldom),
         }
     }
 
@@ -284,6 +293,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let mut image = Image::new(camera.width, camera.height);
         let (width, height) = (camera.width as usize, camera.height as usize);
         let mut wanted = vec![Wanted::default(); image.pixels.len()];
+        let often = &self.probe((eye, &rays), [width, height]);
         let done = AtomicU32::new(0);
         let passes = if printed { 2 } else { 1 };
         let tell = || {
@@ -295,7 +305,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
             let first = band * BAND;
             let sight =
                 Sight::new(&self.solution.scene.visibility, (eye, &rays), 0..width, first..first + means.len() / width);
-            let all = self.band(&sight, wanted, &tell);
+            let all = self.band(&sight, wanted, often, &tell);
             means.iter_mut().zip(&all).for_each(|(mean, seen)| *mean = seen.pixel.radiance());
             let wanted = &*wanted;
             let is_noisy = move |at| rounds_around(wanted, (width, 0..wanted.len() / width), at) > 0;
@@ -307,7 +317,7 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         let rows = if printed { height } else { 0 };
         let noisy = (0..rows).into_par_iter().flat_map_iter(|y| {
             let (wanted, kept, tell) = (&wanted, &kept, &tell);
-            let mut shared = Shared::of(rays.pixel());
+            let mut shared = Shared::of(rays.pixel(), often.clone());
             let row = move |x: usize| {
                 let at = y * width + x;
                 let rounds = rounds_around(wanted, (width, 0..height), at);
@@ -337,11 +347,35 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         Film::new(image, edges.chain(noisy).collect())
     }
 
+    /// Leaves that end many rays of a picture: those that end rays of some of its pixels.
+    fn probe(&self, (eye, rays): (Vec3, &Rays), [width, height]: [usize; 2]) -> Often {
+        if self.ends.is_none() || self.followed <= 0.0 {
+            return Often::All;
+        }
+        let rows = (self.probed / 2..height).into_par_iter().step_by(self.probed);
+        let met = rows.flat_map_iter(|y| {
+            let mut shared = Shared::of(rays.pixel(), Often::Probes(BTreeSet::new()));
+            for x in (self.probed / 2..width).step_by(self.probed) {
+                let sight = Sight::new(&self.solution.scene.visibility, (eye, rays), x..x + 1, y..y + 1);
+                shared.begin(sight.ray([x, y], Vec2::splat(0.5)));
+                self.add_rays(
+                    &mut Pixel::default(),
+                    (&sight, [x, y]),
+                    0..CORNERS.min(self.grid * self.grid),
+                    &mut shared,
+                );
+            }
+            shared.often.met()
+        });
+        Often::Met(Arc::new(met.collect()))
+    }
+
     /// What is seen in rows of pixels, and what is wanted for each. How much they see of each surface is known better
     /// where those beside them differ, or have edges; were that asked of a pixel itself, what is smaller than a pixel would be too
     /// dark, as it is seen only where it was met.
-    fn band(&self, sight: &Sight<'_>, wanted: &mut [Wanted], tell: &dyn Fn()) -> Vec<Seen> {
-        let (mut shared, columns, rows) = (Shared::of(sight.pixel()), sight.columns(), sight.rows());
+    fn band(&self, sight: &Sight<'_>, wanted: &mut [Wanted], often: &Often, tell: &dyn Fn()) -> Vec<Seen> {
+        let mut shared = Shared::of(sight.pixel(), often.clone());
+        let (columns, rows) = (sight.columns(), sight.rows());
         let (width, height) = (columns.len(), rows.len());
         let place = |at: usize| [columns.start + at % width, rows.start + at / width];
         let glances: Vec<_> = (0..wanted.len()).map(|at| self.glance(sight, place(at), &mut shared)).collect();
@@ -427,18 +461,30 @@ impl<'a, B: Basis> RayCaster<'a, B> {
 
     /// What is seen in a pixel by the rays that all have.
     fn pixel(&self, sight: &Sight<'_>, [x, y]: [usize; 2], shared: &mut Shared) -> Seen {
-        let (all, seed) = (self.grid * self.grid, seed([x, y]));
+        let all = self.grid * self.grid;
         let mut pixel = Pixel::default();
         shared.begin(sight.ray([x, y], Vec2::splat(0.5)));
-        for (i, cell) in (0..all).zip(corners_first(self.grid)) {
-            if i == CORNERS {
-                shared.judge_corners(all - CORNERS);
-            }
-            let (_, direction) = sight.ray([x, y], stratified(self.grid, cell, seed));
-            let first = sight.first([x, y], direction);
-            self.add_to(&mut pixel, (sight, first), direction, &Sampler::new(seed, i), shared);
+        self.add_rays(&mut pixel, (sight, [x, y]), 0..CORNERS.min(all), shared);
+        if all > CORNERS {
+            shared.judge_corners(all - CORNERS);
+            self.add_rays(&mut pixel, (sight, [x, y]), CORNERS..all, shared);
         }
         Seen { pixel, found: shared.found }
+    }
+
+    /// Adds what some of the rays see that all pixels have, corners first.
+    fn add_rays(
+        &self,
+        pixel: &mut Pixel,
+        (sight, at): (&Sight<'_>, [usize; 2]),
+        those: Range<u32>,
+        shared: &mut Shared,
+    ) {
+        let seed = seed(at);
+        for (i, cell) in (0..).zip(corners_first(self.grid)).skip(those.start as usize).take(those.len()) {
+            let (_, direction) = sight.ray(at, stratified(self.grid, cell, seed));
+            self.add_to(pixel, (sight, sight.first(at, direction)), direction, &Sampler::new(seed, i), shared);
+        }
     }
 
     /// Goes on with some rounds of rays more than all have.
@@ -663,10 +709,11 @@ impl<'a, B: Basis> RayCaster<'a, B> {
         glossy::interpolated(self.solution, &corners, (met.hit.point, met.normal), met.away)
     }
 
-    /// The same from the distribution of the leaf itself, or from the samples that arrive where a texture says what is reflected.
+    /// The same from the distribution of the leaf itself, or from the samples that arrive where that is asked for seldom, or a texture says
+    /// what is reflected.
     fn by_itself(&self, met: &Met, shared: &mut Shared) -> Rgb {
-        if let Some(ends) = self.ends.as_ref().filter(|_| self.is_plain(met)) {
-            let leaf = NodeId(self.solution.faces.standing(met.leaf.0));
+        let leaf = NodeId(self.solution.faces.standing(met.leaf.0));
+        if let Some(ends) = self.ends.as_ref().filter(|ends| self.is_plain(met) && ends.pays(leaf, &mut shared.often)) {
             return ends.leaving(self.solution, leaf, (met.hit.point, glossy::mirrored(met.normal, met.away)));
         }
         let (place, away) = (met.place(), met.away);
@@ -888,7 +935,7 @@ mod tests {
 
         // Smooth pixels have one ray.
         let mut wanted = vec![Wanted::default(); 90 * 60];
-        let band = caster.band(&sight, &mut wanted, &|| ());
+        let band = caster.band(&sight, &mut wanted, &Often::All, &|| ());
         let (mut off, mut light, mut most) = (0.0, 0.0, 0.0_f32);
         for (at, Seen { pixel, .. }) in band.iter().enumerate().filter(|(at, _)| sight.is_even([at % 90, at / 90])) {
             let full = caster.pixel(&sight, [at % 90, at / 90], &mut shared).pixel.radiance();
@@ -939,6 +986,37 @@ mod tests {
         // Rays go on where they meet gloss again, so that next to all of these are the test's own.
         let known = caster.spared().known_ends;
         assert!(known > 300, "{known}");
+    }
+
+    /// Where few rays end at a leaf, its light is reflected toward each of them: the picture is the same.
+    #[test]
+    fn leaves_at_few_ends_have_no_distributions() {
+        let (room, camera) = polished(0.15, 0.25);
+        let camera = Camera { width: 120, height: 80, ..camera };
+        let mut scene = Arc::unwrap_or_clone(room);
+        let at = |turn: u32, height: u32| {
+            let [turn, height] = [turn, height].map(|i| f64::from(i) * std::f64::consts::PI / 24.0);
+            let (sin, cos) = height.sin_cos();
+            DVec3::new(0.6, 0.55, 0.35) + 0.3 * DVec3::new(sin * turn.cos(), sin * turn.sin(), cos)
+        };
+        for (turn, height) in (0..48).flat_map(|turn| (1..24).map(move |height| (turn, height))) {
+            let [a, b] = [height, height + 1].map(|height| at(turn, height));
+            let [c, d] = [height, height - 1].map(|height| at(turn + 1, height));
+            scene.surfaces.extend([[a, b, c], [a, c, d]].map(|corners| Surface::new(Shape::Triangle(corners), 0)));
+        }
+        let scene = Arc::new(scene);
+        let go_on = &mut |_: &_| ControlFlow::Continue(());
+        let solved = Solved::new(Arc::clone(&scene), Settings::with_error(0.05), false, go_on).expect("a sound scene");
+        let caster = |probed| RayCaster { probed, ..RayCaster::new(&scene, &solved.solution, Mode::Samples) };
+        let (probing, alone) = (caster(PROBED), caster(usize::MAX));
+        let [found, right] = [&probing, &alone].map(|caster| caster.render(&camera, &|_| ()).pixels);
+        let [probing, alone] = [probing, alone].map(|caster| caster.spared());
+        assert!(probing.known_ends > 500 && probing.seldom_ends > 500, "{probing:?}");
+        assert!(alone.known_ends == 0 && alone.seldom_ends > 1000, "{alone:?}");
+        let light = |pixel: &Rgb| pixel.element_sum().min(3.0);
+        let off: f32 = found.iter().zip(&right).map(|(found, right)| (light(found) - light(right)).abs()).sum();
+        let off = off / right.iter().map(light).sum::<f32>();
+        assert!(off < 1e-3, "{off}");
     }
 
     /// A room of walls whose polish has this roughness and albedo, with a lamp, and how a camera sees it.

@@ -85,6 +85,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times, spared: Spared)
             "exact_shadows": spared.exact_shadows,
             "covered_ends": spared.covered_ends,
             "known_ends": spared.known_ends,
+            "seldom_ends": spared.seldom_ends,
             "shot_links": skipped.shot_links,
             "negligible_detail": solution.field.counters().negligible_detail(),
             "interpolated_samples": solution.field.counters().interpolated(),

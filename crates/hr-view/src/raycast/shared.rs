@@ -1,5 +1,6 @@
 //! What the rays of a pixel have in common, and what the first of them tell about how many the others need.
 
+use super::ends::Often;
 use glam::Vec3;
 use glossy_ext::Incident;
 use hr_diffuse::{Hit, Rgb};
@@ -35,6 +36,8 @@ pub(super) struct Shared {
     pub(super) middle: Option<Option<Shaded>>,
     /// How wide pixels are at distance 1; infinite where there are none.
     pub(super) pixel: f32,
+    /// Of all pixels: leaves that end many rays.
+    pub(super) often: Often,
 }
 
 /// The lobes that a ray from the eye is in, one after the other.
@@ -75,19 +78,21 @@ impl Default for Shared {
             ray: Default::default(),
             middle: None,
             pixel: f32::INFINITY,
+            often: Often::All,
         }
     }
 }
 
 impl Shared {
     /// That of pixels which are so wide at distance 1.
-    pub(super) fn of(pixel: f32) -> Self {
-        Self { pixel, ..Self::default() }
+    pub(super) fn of(pixel: f32, often: Often) -> Self {
+        Self { pixel, often, ..Self::default() }
     }
 
     /// Begins a pixel, given the ray through its middle.
     pub(super) fn begin(&mut self, ray: (Vec3, Vec3)) {
-        *self = Self { ray, incident: std::mem::take(&mut self.incident), ..Self::of(self.pixel) };
+        let often = std::mem::take(&mut self.often);
+        *self = Self { ray, incident: std::mem::take(&mut self.incident), ..Self::of(self.pixel, often) };
     }
 
     /// After the corners: what the other rays need that all pixels have.
