@@ -60,8 +60,8 @@ impl<L: LightField> Light<'_, L> {
     }
 
     /// The same at a single point.
-    pub(crate) fn brought_to(&self, x: Vec3, n: Vec3, sender: u32, negligible: f32) -> Vec2 {
-        let (light, share) = self.arriving_at(x, n, sender, Detail::carried(negligible));
+    pub(crate) fn brought_to(&self, x: Vec3, n: Vec3, sender: u32, detail: Detail) -> Vec2 {
+        let (light, share) = self.arriving_at(x, n, sender, detail);
         Vec2::new(light.element_sum(), share)
     }
 
@@ -70,7 +70,7 @@ impl<L: LightField> Light<'_, L> {
         if self.emitted_most(sender) <= 0.0 {
             return;
         }
-        let at = |x: Vec3, n: Vec3| self.brought_to(x, n, sender, spots.negligible);
+        let at = |x: Vec3, n: Vec3| self.brought_to(x, n, sender, Detail::carried(spots.negligible));
         if element.kind != Kind::Light && spots.is_far(element) {
             let (x, n) = spots.middle;
             if let Some(values) = spots.by_middle(element, at(x, n)) {
@@ -107,7 +107,7 @@ mod tests {
             far += u32::from(spots.is_far(sender));
             let at_once = light.arriving_all_over(spots, link.sender);
             for (at_once, &(x, n, weight)) in at_once.into_iter().zip(&points) {
-                let by_point = light.brought_to(x, n, link.sender, 0.0);
+                let by_point = light.brought_to(x, n, link.sender, Detail::carried(0.0));
                 off += weight * receiver.area * (at_once - by_point).abs();
                 all += weight * receiver.area * by_point;
             }

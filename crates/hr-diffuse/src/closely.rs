@@ -96,17 +96,27 @@ impl<L: LightField> Hierarchy for Closely<'_, L> {
     }
     fn look(&self, leaf: NodeId, sender: NodeId, rays: u32) -> Option<Rgb> {
         let element = self.light.element(leaf.0);
-        let (irradiance, _) =
-            self.light.arriving_at(element.center, element.normals.axis, sender.0, Detail::carried(0.0));
-        if irradiance == Rgb::ZERO {
-            return Some(irradiance);
-        }
         let seed = hash(leaf.0, 0x100c);
-        let middle = (element.center, element.normals.axis, element.source);
-        let spot =
-            |i: u32| receiving_point(self.light, leaf.0, (unit(hash(seed, i)), point2(seed, i))).unwrap_or(middle);
-        self.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
-        Some(irradiance * visibility_at(self.light, spot, sender.0, (rays, seed)))
+        let (x, n) = (element.center, element.normals.axis);
+        let arriving = |detail: Detail| self.light.arriving_at(x, n, sender.0, detail).0;
+        let see = || {
+            let spot = |i: u32| {
+                receiving_point(self.light, leaf.0, (unit(hash(seed, i)), point2(seed, i))).unwrap_or((
+                    x,
+                    n,
+                    element.source,
+                ))
+            };
+            self.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
+            visibility_at(self.light, spot, sender.0, (rays, seed))
+        };
+        // Most is hidden: what it would bring is found out only where something of it is seen.
+        let first = (arriving(Detail::rough()) != Rgb::ZERO).then(see);
+        if first == Some(0.0) {
+            return Some(Rgb::ZERO);
+        }
+        let irradiance = arriving(Detail::carried(0.0));
+        Some(if irradiance == Rgb::ZERO { irradiance } else { irradiance * first.unwrap_or_else(see) })
     }
 }
 

@@ -19,6 +19,7 @@ use crate::places::{Edges, Places};
 use crate::sampling::{hash, unit};
 use crate::segments::{receiving_point, visibility};
 use crate::threads;
+use crate::toward::Detail;
 use crate::transport::{Light, negligible};
 use crate::visibility::Proof;
 use glam::{Vec2, Vec3};
@@ -626,7 +627,7 @@ impl Place {
     /// The same of a sender that is far, by what arrives in the middle.
     fn by_middle<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> (Weight, f32) {
         let (x, n, _) = self.middle;
-        let brought = light.brought_to(x, n, link.sender, self.negligible);
+        let brought = light.brought_to(x, n, link.sender, Detail::carried(self.negligible));
         if light.element(self.node).is_patch() || light.elements.is_distant(NodeId(link.sender)) {
             return (Weight { value: brought.x, ..Weight::default() }, brought.y);
         }
@@ -717,6 +718,12 @@ impl Place {
         if unit(hash(hash(self.node, 0x20e1), link.sender)) >= chance {
             return Found { spared: true, ..Found::default() };
         }
+        // Next to nothing of what is near is seen of most: what it would bring is found out only where something is.
+        let rough = if shared && link.visibility >= 0.0 { self.roughly(light, link) } else { 0.0 };
+        let first = (rough > 0.0).then(|| self.seen(light, link, rough * visible, before));
+        if let Some((0.0, rays)) = first {
+            return Found { view: Some(0.0), rays, ..Found::default() };
+        }
         let (here, view) = if !shared {
             (Weight { value: mean, ..Weight::default() }, None)
         } else if !outlook.far && (!element.is_patch() || mean * visible > self.much) {
@@ -728,20 +735,27 @@ impl Place {
         } else {
             let direction = light.direction_to(element.center, link.sender);
             let cosine = element.mean_cosine(direction);
-            let brought = cosine * light.brought_to(element.center, direction, link.sender, self.negligible);
+            let brought =
+                cosine * light.brought_to(element.center, direction, link.sender, Detail::carried(self.negligible));
             (Weight { value: brought.x, ..Weight::default() }, Some(brought.y))
         };
         if here.value <= 0.0 {
-            return Found::default();
+            return Found { rays: first.map_or(0, |(_, rays)| rays), ..Found::default() };
         }
         let weight = here * ((here.value / mean).min(MOST_WEIGHT) / here.value);
         if link.visibility < 0.0 {
             return Found { weight, view: view.map(|view| view * visible), ..Found::default() };
         }
         let worth = if shared { visible } else { visible.max(LEAST_WORTH) };
-        let (seen, rays) = self.seen(light, link, here.value * worth, before);
+        let (seen, rays) = first.unwrap_or_else(|| self.seen(light, link, here.value * worth, before));
         let seen = seen / chance;
         Found { weight: weight * (seen / visible), view: view.map(|view| view * seen), rays, ..Found::default() }
+    }
+
+    /// About what a link brings where it is wholly visible: as much as tells how many rays it is worth.
+    fn roughly<L: LightField>(&self, light: Light<'_, L>, link: &Link) -> f32 {
+        let at = |&(x, n, weight): &(Vec3, Vec3, f32)| weight * light.brought_to(x, n, link.sender, Detail::rough()).x;
+        self.points.iter().map(at).sum()
     }
 
     /// How likely a link is looked at that `may_bring` so much, if that is left to chance: one for more than this place that lets hardly any
