@@ -44,6 +44,7 @@
 //! or finer in parts). Refinement stops there, coarse levels first, and says so ([`Projected::truncated`]).
 
 mod combine;
+mod integrals;
 mod keep;
 mod mesh;
 mod nodes;
@@ -61,7 +62,7 @@ use crate::Rgb;
 use crate::basis::Basis;
 use crate::basis::half::{Half3, decode, encode, scale_for};
 use crate::basis::triangle::{ConeTest, Overlap, PIECE_SPLITS, Triangle, child_corners, midpoints};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use hr_diffuse::Cone;
 use nodes::{Layout, Node};
 
@@ -99,6 +100,17 @@ struct Visit {
     vertices: [u16; 3],
     node: Option<usize>,
     level: u8,
+    /// Among all triangles of its face: that is 0, and the parts of triangle i are 4i + 1 to 4i + 4.
+    place: usize,
+}
+
+/// A triangle over which the quantity is linear, in units of the scale.
+struct Piece {
+    triangle: Triangle,
+    /// As of a [`Visit`].
+    place: usize,
+    /// At its corners.
+    values: [Rgb; 3],
 }
 
 impl Visit {
@@ -111,6 +123,7 @@ impl Visit {
             vertices: child_corners(self.vertices, mids, child),
             node: node.child(child),
             level: self.level + 1,
+            place: 4 * self.place + 1 + child,
         };
         [child(0), child(1), child(2), child(3)]
     }
@@ -261,35 +274,8 @@ impl Haar {
         Some(around)
     }
 
-    /// ∫ over the sphere, per steradian of the quantity: of intensity (W/sr), the power (W).
-    #[must_use]
-    pub fn integral(&self) -> Rgb {
-        self.sum_of_pieces(|triangle, values, splits| triangle.integrate(values, splits, &|_| 1.0).0)
-    }
-
-    /// ∫ of the quantity times the cosine to `normal` (unit length) over the hemisphere around it: of radiance
-    /// (W/(m² sr)), the radiosity (W/m²).
-    #[must_use]
-    pub fn cosine_integral(&self, normal: Vec3) -> Rgb {
-        self.sum_of_pieces(|triangle, values, splits| {
-            triangle.integrate_above(values, normal, splits, splits + HORIZON_SPLITS)
-        })
-    }
-
-    /// Adds up integrals over the pieces, in units of the scale, each by a quadrature over parts from so many splits.
-    fn sum_of_pieces(&self, integral: impl Fn(&Triangle, [DVec3; 3], u32) -> DVec3) -> Rgb {
-        let mut sum = DVec3::ZERO;
-        self.pieces(&mut |_| true, &mut |triangle, values| {
-            // The Jacobian varies by 5.2 over a face of the octahedron; a radius of 15° is little enough for degree 5.
-            let splits =
-                [(0.966, 0), (0.85, 1)].iter().find(|(cos, _)| triangle.cos_radius() >= *cos).map_or(2, |w| w.1);
-            sum += integral(triangle, values.map(|v| v.as_dvec3()), splits);
-        });
-        (sum * f64::from(self.scale)).as_vec3()
-    }
-
-    /// Visits the linear pieces under all triangles that `enter` lets pass, with values in units of the scale.
-    fn pieces(&self, enter: &mut impl FnMut(&Visit) -> bool, piece: &mut impl FnMut(&Triangle, [Rgb; 3])) {
+    /// Visits the linear pieces under all triangles that `enter` lets pass.
+    fn pieces(&self, enter: &mut impl FnMut(&Visit) -> bool, piece: &mut impl FnMut(&Piece)) {
         if self.vertices.is_empty() {
             return;
         }
@@ -298,25 +284,20 @@ impl Haar {
 
     fn face(&self, face: usize) -> Visit {
         let triangle = Triangle::new(face_corners(face));
-        Visit { triangle, vertices: Self::face_vertices(face), node: self.root(face), level: 0 }
+        Visit { triangle, vertices: Self::face_vertices(face), node: self.root(face), level: 0, place: 0 }
     }
 
     fn faces(&self) -> impl Iterator<Item = Visit> {
         (0..8).map(|face| self.face(face))
     }
 
-    fn pieces_below(
-        &self,
-        visit: &Visit,
-        enter: &mut impl FnMut(&Visit) -> bool,
-        piece: &mut impl FnMut(&Triangle, [Rgb; 3]),
-    ) {
+    fn pieces_below(&self, visit: &Visit, enter: &mut impl FnMut(&Visit) -> bool, piece: &mut impl FnMut(&Piece)) {
         if !enter(visit) {
             return;
         }
         let values = || self.at_vertices(visit.vertices);
         let Some(index) = visit.node else {
-            return piece(&visit.triangle, values());
+            return piece(&Piece { triangle: visit.triangle, place: visit.place, values: values() });
         };
         let node = self.node(index);
         if node.is_divided() {
@@ -324,8 +305,9 @@ impl Haar {
         } else {
             let corners = values();
             let mids = self.mid_values(corners, node);
-            for (child, triangle) in visit.triangle.children().iter().enumerate() {
-                piece(triangle, child_corners(corners, mids, child));
+            for (child, triangle) in visit.triangle.children().into_iter().enumerate() {
+                let place = 4 * visit.place + 1 + child;
+                piece(&Piece { triangle, place, values: child_corners(corners, mids, child) });
             }
         }
     }
@@ -358,7 +340,7 @@ impl Haar {
             }
             true
         };
-        self.pieces(&mut enter, &mut |_, _| ());
+        self.pieces(&mut enter, &mut |_| ());
         positions
     }
 
@@ -415,7 +397,7 @@ impl Haar {
             true
         };
         if !self.is_empty() {
-            self.pieces(&mut enter, &mut |_, _| ());
+            self.pieces(&mut enter, &mut |_| ());
         }
         level
     }
@@ -483,9 +465,6 @@ impl Basis for Haar {
         self.bytes()
     }
 }
-
-/// Parts that the horizon cuts are split so many times more: the cosine has a kink there.
-const HORIZON_SPLITS: u32 = 2;
 
 /// Which child holds a point: the one at corner 0, 1, 2, or the one in the middle if none is set.
 ///

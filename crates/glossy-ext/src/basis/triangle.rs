@@ -214,20 +214,10 @@ impl Triangle {
         (sum, total)
     }
 
-    /// The same of the cosine to `normal` where that is positive: split `at_horizon` times where that changes its sign.
-    pub(crate) fn integrate_above(&self, values: [DVec3; 3], normal: Vec3, splits: u32, at_horizon: u32) -> DVec3 {
-        let heights = self.corners.map(|corner| corner.dot(normal));
-        if heights.iter().all(|&height| height <= 0.0) {
-            return DVec3::ZERO;
-        }
-        if at_horizon == 0 || heights.iter().all(|&height| height >= 0.0) {
-            return self.integrate(values, splits, &|d| d.dot(normal).max(0.0)).0;
-        }
-        let mids = EDGE_ENDS.map(|[a, b]| 0.5 * (values[a] + values[b]));
-        (0..4).fold(DVec3::ZERO, |sum, i| {
-            let values = child_corners(values, mids, i);
-            sum + self.child(i).integrate_above(values, normal, splits.saturating_sub(1), at_horizon - 1)
-        })
+    /// Which way its octant lies, of a part of a face of the octahedron.
+    pub(crate) fn signs(&self) -> Vec3 {
+        let [a, b, c] = self.corners;
+        (a + b + c).signum()
     }
 
     /// Solid angle in steradians to first order: the Jacobian in the middle. For weighting neighbours only.

@@ -44,7 +44,7 @@ fn leaves(haar: &Haar) -> Vec<(Triangle, u8)> {
             }
             true
         },
-        &mut |_, _| (),
+        &mut |_| (),
     );
     found
 }
