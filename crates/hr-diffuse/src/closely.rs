@@ -97,16 +97,11 @@ impl<L: LightField> Hierarchy for Closely<'_, L> {
     fn look(&self, leaf: NodeId, sender: NodeId, rays: u32) -> Option<Rgb> {
         let element = self.light.element(leaf.0);
         let seed = hash(leaf.0, 0x100c);
-        let (x, n) = (element.center, element.normals.axis);
+        let middle @ (x, n, _) = (element.center, element.normals.axis, element.source);
         let arriving = |detail: Detail| self.light.arriving_at(x, n, sender.0, detail).0;
+        let spot =
+            |i: u32| receiving_point(self.light, leaf.0, (unit(hash(seed, i)), point2(seed, i))).unwrap_or(middle);
         let see = || {
-            let spot = |i: u32| {
-                receiving_point(self.light, leaf.0, (unit(hash(seed, i)), point2(seed, i))).unwrap_or((
-                    x,
-                    n,
-                    element.source,
-                ))
-            };
             self.rays.fetch_add(u64::from(rays), Ordering::Relaxed);
             visibility_at(self.light, spot, sender.0, (rays, seed))
         };

@@ -718,7 +718,7 @@ impl Place {
         if unit(hash(hash(self.node, 0x20e1), link.sender)) >= chance {
             return Found { spared: true, ..Found::default() };
         }
-        // Next to nothing of what is near is seen of most: what it would bring is found out only where something is.
+        // Most of what is near is hidden: what it would bring is found out only where something of it is seen.
         let rough = if shared && link.visibility >= 0.0 { self.roughly(light, link) } else { 0.0 };
         let first = (rough > 0.0).then(|| self.seen(light, link, rough * visible, before));
         if let Some((0.0, rays)) = first {

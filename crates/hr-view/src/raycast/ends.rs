@@ -75,10 +75,11 @@ impl<B: Basis> Ends<B> {
         }
     }
 
-    /// Whether it pays to make the distribution of a leaf that was met once more.
+    /// Whether it pays to make the distribution of a leaf that was met once more. Probes are not counted.
     pub(super) fn pays(&self, leaf: NodeId, often: &mut Often) -> bool {
         let pays = often.holds(leaf);
-        self.seldom.fetch_add(u64::from(!pays), Ordering::Relaxed);
+        let is_seldom = !pays && matches!(often, Often::Met(_));
+        self.seldom.fetch_add(u64::from(is_seldom), Ordering::Relaxed);
         pays
     }
 
