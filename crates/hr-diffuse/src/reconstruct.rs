@@ -17,7 +17,7 @@ use crate::places::Places;
 use crate::push::{Spread, spreads};
 use crate::rows::{self, Correction, Row, look_around};
 use crate::sampling::hash;
-use crate::segments::visibility_at;
+use crate::segments::visible_at;
 use crate::solution::Seen;
 use crate::threads;
 use crate::toward::Detail;
@@ -34,6 +34,9 @@ use std::ops::{AddAssign, ControlFlow, Mul};
 const RAYS: f32 = 160.0;
 /// No link gets more rays than this at one vertex.
 const MOST_RAYS: f32 = 40.0;
+/// Whatever light it brings, a link to what takes up all of a vertex's view gets so many rays, others in proportion: by what they see
+/// of the view its row is corrected, and with it all other light.
+const ROW_RAYS: f32 = 80.0;
 /// All vertices look at the same points of a sender. What each has wrong is then much the same as what its neighbours have wrong, and
 /// half shadows are smooth; points of each vertex's own would mottle walls.
 const SAME_POINTS: u32 = 0x8103_205b;
@@ -301,6 +304,7 @@ fn gather_at<L: LightField>(
         let renewed = visibility >= 0.0 && share > if partial { PARTIAL_SHARE } else { WHOLE_SHARE };
         // What is proved of a link holds everywhere.
         let known = renewed || visibility < 0.0;
+        let mut in_view = visibility.abs();
         proved += if visibility < 0.0 { view } else { 0.0 };
         if known {
             known_here.push(sender);
@@ -313,10 +317,11 @@ fn gather_at<L: LightField>(
             });
             let from = |i: u32| spots.spot(known_here.len() as u32 + i).unwrap_or((x, n, element.source));
             let rarer = if visibility == 0.0 && is_hidden(sender) { HIDDEN_SHARE } else { 1.0 };
-            let count = ((share * RAYS).min(MOST_RAYS) * rarer).max(1.0) as u32;
+            let count = ((share * RAYS).min(MOST_RAYS).max(view * ROW_RAYS) * rarer).max(1.0) as u32;
             rays += count;
             let was_hidden = visibility == 0.0;
-            visibility = visibility_at(light, from, sender, (count, SAME_POINTS));
+            let visible = visible_at(light, from, sender, (count, SAME_POINTS));
+            (visibility, in_view) = (visible.light, visible.view);
             if was_hidden && visibility > 0.0 {
                 (irradiance, view) = closely(sender);
             }
@@ -333,7 +338,7 @@ fn gather_at<L: LightField>(
             Group::Emitter => &mut row.emitters,
             _ if known => &mut row.own,
             _ => &mut row.inherited,
-        } += view * visibility.abs();
+        } += view * in_view;
     }
     known_here.sort_unstable();
     let is_own = |sender: u32| known_here.binary_search(&sender).is_ok();

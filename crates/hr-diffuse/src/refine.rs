@@ -519,8 +519,8 @@ fn decide<L: LightField>(
         visibility: 0.0,
     };
     if link.factor <= 0.0 && bounds.max > 0.0 && !stopped {
-        // The sampled points did not face each other, though some may: no light worth splitting for.
-        link.visibility = 1.0;
+        // The sampled points did not face each other, though some may: no light worth splitting for. Vertices that do face the sender look
+        // whether they see it, where it brings much.
         return Verdict::Keep(link);
     }
     let near = 2.0 * (r.radius + s.radius) > r.center.distance(s.center);
@@ -674,4 +674,40 @@ fn mean_factor<L: LightField>(light: Light<'_, L>, pair: Pair, relative: f32) ->
 pub(crate) fn estimate<L: LightField>(light: Light<'_, L>, link: &Link) -> f32 {
     let away = -light.direction_to(light.element(link.receiver).center, link.sender);
     light.emitted(link.sender, away).max_element() * link.factor
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{DiffuseMaterial, Rgb, SceneInput, Settings, Shape, Solver, Surface};
+    use glam::DVec3;
+    use std::ops::ControlFlow;
+
+    /// A dim shelf faces what is above it: the top of a ball, not its middle. So its link to the ball carries nothing, and nobody knows what
+    /// of the shelf is seen from where the ball does face it.
+    #[test]
+    fn what_carries_nothing_is_not_taken_to_be_seen() {
+        let (x, y, z, o) = (DVec3::X, DVec3::Y, DVec3::Z, DVec3::ZERO);
+        let quad =
+            |o: DVec3, a: DVec3, b: DVec3, material| Surface::new(Shape::Quad([o, o + a, o + a + b, o + b]), material);
+        let surfaces = vec![
+            quad(o, x, y, 0),
+            quad(z, y, x, 0),
+            quad(o, y, z, 0),
+            quad(x, z, y, 0),
+            quad(o, z, x, 0),
+            quad(y, x, z, 0),
+            quad(0.99 * z + 0.4 * (x + y), 0.2 * y, 0.2 * x, 1),
+            quad(0.8 * z + 0.1 * (x + y), 0.2 * x, 0.2 * y, 2),
+            Surface::new(Shape::Sphere { center: DVec3::new(0.6, 0.6, 0.75), radius: 0.15 }, 0),
+        ];
+        let wall = DiffuseMaterial { reflectance: Rgb::splat(0.6), exitance: Rgb::ZERO, two_sided: false };
+        let lamp = DiffuseMaterial { exitance: Rgb::ONE, ..wall };
+        let dim = DiffuseMaterial { reflectance: Rgb::splat(1e-4), ..wall };
+        let input = SceneInput { surfaces, materials: vec![wall, lamp, dim], ..SceneInput::default() };
+        let mut solver = Solver::new(&input, Settings::with_error(0.3), ()).expect("the room is sound");
+        solver.solve(&mut |_| ControlFlow::Continue(()));
+        let empty: Vec<_> = solver.links.all().iter().filter(|link| link.factor == 0.0).collect();
+        assert!(!empty.is_empty(), "some link carries nothing");
+        assert!(empty.iter().all(|link| link.visibility == 0.0), "{empty:?}");
+    }
 }

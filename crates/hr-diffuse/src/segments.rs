@@ -10,6 +10,7 @@ use crate::transport::{Exitant, Light};
 use crate::visibility::Proof;
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
+use std::ops::AddAssign;
 
 /// Parts of surfaces nearer than this many radii are drawn from by parts, …
 const NEAR: f32 = 2.0;
@@ -17,6 +18,9 @@ const NEAR: f32 = 2.0;
 const NEAR_LEVELS: u32 = 4;
 /// Radiosities that differ by no more than this share are taken to be the same.
 const EVENLY: f32 = 0.1;
+
+/// Of a sender's parts dim ones are drawn so seldom that they count for many when its view is estimated: for no more than these.
+const MOST_FOR_DIM: f32 = 1e3;
 
 /// How far away distant light is taken to come from: outside of unit space and half as much around it, from
 /// wherever in there.
@@ -32,6 +36,8 @@ struct Point {
     area: f32,
     /// How much rarer the point was drawn than by area and density.
     rarity: f32,
+    /// Density there over the mean of the node.
+    density: f32,
 }
 
 /// How densely the points of a node are drawn.
@@ -79,6 +85,7 @@ fn draw(
     from: Option<Vec3>,
 ) -> Option<Point> {
     let mut rarity = 1.0;
+    let mean = density.of(elements, node as usize);
     loop {
         let element = &elements.nodes[node as usize];
         if element.kind == Kind::Light {
@@ -95,7 +102,8 @@ fn draw(
             let (at, normal) = geometry.sample(part.domain, u.x, u.y);
             let normal = if element.kind == Kind::Back { -normal } else { normal };
             let (surface, area) = (element.source, part.area);
-            return Some(Point { at, normal, surface, area, rarity: rarity * part.rarity });
+            let density = density.of(elements, node as usize) / mean;
+            return Some(Point { at, normal, surface, area, rarity: rarity * part.rarity, density });
         }
         let children = element.first_child as usize..(element.first_child + element.child_count) as usize;
         let nearness = |element: &Element| match from {
@@ -203,16 +211,17 @@ pub(crate) fn visibility<L: LightField>(
 ) -> (f32, f32, u32) {
     let segments =
         range.filter_map(|i| (0..TRIES).find_map(|attempt| segment(light, receiver, sender, (seed, i, attempt))));
-    shoot(light.scene, segments, (proof, blocker))
+    let (seen, total, rays) = shoot(light.scene, segments, (proof, blocker));
+    (seen.light, total.light, rays)
 }
 
-/// Shoots segments: the weight that is not blocked, that of all, and the number of rays.
+/// Shoots segments: the weights that are not blocked, those of all, and the number of rays.
 fn shoot(
     scene: &SceneData,
     segments: impl Iterator<Item = Segment>,
     (proof, blocker): (&Proof, &mut u32),
-) -> (f32, f32, u32) {
-    let (mut seen, mut total, mut rays) = (0.0, 0.0, 0);
+) -> (Visible, Visible, u32) {
+    let (mut seen, mut total, mut rays) = (Visible::default(), Visible::default(), 0);
     for segment in segments {
         rays += 1;
         total += segment.weight;
@@ -228,7 +237,34 @@ struct Segment {
     from: Vec3,
     to: Vec3,
     surfaces: [u32; 2],
-    weight: f32,
+    weight: Visible,
+}
+
+/// What is seen of a sender: its shares of the light that it sends, and of the view that it takes up. Where it is bright it may be hidden,
+/// or where it is dark.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Visible {
+    pub(crate) light: f32,
+    pub(crate) view: f32,
+}
+
+impl Visible {
+    /// As much of the one as of the other.
+    fn all(share: f32) -> Self {
+        Self { light: share, view: share }
+    }
+
+    fn share_of(self, total: Self) -> Self {
+        let share = |part: f32, of: f32| if of > 0.0 { part / of } else { 0.0 };
+        Self { light: share(self.light, total.light), view: share(self.view, total.view) }
+    }
+}
+
+impl AddAssign for Visible {
+    fn add_assign(&mut self, other: Self) {
+        self.light += other.light;
+        self.view += other.view;
+    }
 }
 
 /// One attempt at the segment of an index: `None` where its points do not face each other.
@@ -248,7 +284,8 @@ fn segment<L: LightField>(
     if source.kind == Kind::Light {
         let r = on_receiver(None)?;
         let (to, weight) = light_segment(scene, source.source as usize, r.at, r.normal);
-        return (weight > 0.0).then_some(Segment { from: r.at, to, surfaces: [r.surface, u32::MAX], weight });
+        let (surfaces, weight) = ([r.surface, u32::MAX], Visible::all(weight));
+        return (weight.light > 0.0).then_some(Segment { from: r.at, to, surfaces, weight });
     }
     // Of the larger one most of what matters is near the other.
     let (r, s, part) = if target.radius > source.radius {
@@ -270,7 +307,8 @@ fn between((x, n, surface): (Vec3, Vec3, u32), s: &Point, part: Point) -> Option
     let d2 = to.length_squared();
     let (a, b) = (to.dot(n), -to.dot(s.normal));
     let faces = a > 0.0 && b > 0.0 && d2 > 0.0;
-    let weight = kernel(a * b, d2, part.area) * part.rarity;
+    let light = kernel(a * b, d2, part.area) * part.rarity;
+    let weight = Visible { light, view: light * s.density.recip().min(MOST_FOR_DIM) };
     faces.then_some(Segment { from: x, to: s.at, surfaces: [surface, s.surface], weight })
 }
 
@@ -308,14 +346,25 @@ pub(crate) fn light_segment(scene: &SceneData, light: usize, x: Vec3, n: Vec3) -
     }
 }
 
-/// Share of a sender that is seen from some points, told by index, from `count` segments; 0 where none faces them.
+/// Share of a sender's light that is seen from some points, told by index, from `count` segments; 0 where none faces them.
 #[must_use]
 pub(crate) fn visibility_at<L: LightField>(
-    Light { scene, elements, exitant, .. }: Light<'_, L>,
+    light: Light<'_, L>,
     from: impl Fn(u32) -> Spot,
     sender: u32,
     (count, seed): (u32, u32),
 ) -> f32 {
+    visible_at(light, from, sender, (count, seed)).light
+}
+
+/// What is seen of a sender from some points, as [`visibility_at`].
+#[must_use]
+pub(crate) fn visible_at<L: LightField>(
+    Light { scene, elements, exitant, .. }: Light<'_, L>,
+    from: impl Fn(u32) -> Spot,
+    sender: u32,
+    (count, seed): (u32, u32),
+) -> Visible {
     let source = &elements.nodes[sender as usize];
     let mut blocker = u32::MAX;
     if source.kind == Kind::Light {
@@ -324,7 +373,7 @@ pub(crate) fn visibility_at<L: LightField>(
             let (to, cosine) = light_segment(scene, source.source as usize, x, n);
             cosine > 0.0 && !scene.visibility.occluded(x, to, [surface, u32::MAX], &mut blocker)
         };
-        return (0..count).filter(|i| is_free(i)).count() as f32 / count.max(1) as f32;
+        return Visible::all((0..count).filter(|i| is_free(i)).count() as f32 / count.max(1) as f32);
     }
     let seed = hash(seed, sender);
     let segment = |i: u32, attempt: u32| {
@@ -335,7 +384,7 @@ pub(crate) fn visibility_at<L: LightField>(
     };
     let segments = (0..count).filter_map(|i| (0..TRIES).find_map(|attempt| segment(i, attempt)));
     let (seen, total, _) = shoot(scene, segments, (&Proof::Unknown, &mut blocker));
-    if total > 0.0 { seen / total } else { 0.0 }
+    seen.share_of(total)
 }
 
 #[cfg(test)]
@@ -410,6 +459,29 @@ mod tests {
         solver.exitant.range[ceiling as usize] = [Rgb::splat(0.01), Rgb::ONE];
         let (seen, bright_share) = (see(&solver), 1.0 / 1.03);
         assert!((seen - bright_share).abs() < 0.05, "nearly all of its light passes: {seen}");
+    }
+
+    /// Where most of a sender is dark and hidden, nearly all of its light is seen, but little of it.
+    #[test]
+    fn what_is_seen_of_the_view_counts_by_area() {
+        let (mut solver, [floor, ceiling]) = solver();
+        let element = solver.elements.nodes[ceiling as usize];
+        let lit = |child: &u32| {
+            let at = solver.scene.normalization.to_scene(solver.elements.nodes[*child as usize].center);
+            at.x < 0.5 && at.y < 0.5
+        };
+        let bright = (element.first_child..element.first_child + element.child_count).find(lit);
+        let (least, most) = (Rgb::splat(0.1), Rgb::ONE);
+        let dark = element.first_child..element.first_child + element.child_count;
+        dark.for_each(|child| solver.exitant.radiosity[child as usize] = least);
+        solver.exitant.radiosity[bright.expect("one of four parts is in the corner") as usize] = most;
+        solver.exitant.radiosity[ceiling as usize] = (most + 3.0 * least) / 4.0;
+        solver.exitant.range[ceiling as usize] = [least, most];
+        let floor = solver.elements.nodes[floor as usize];
+        let from = |_| (floor.center, floor.normals.axis, floor.source);
+        let visible = visible_at(solver.light(), from, ceiling, (4096, 1));
+        assert!((visible.light - 1.0 / 1.3).abs() < 0.02, "nearly all of its light: {visible:?}");
+        assert!((visible.view - 0.25).abs() < 0.02, "a fourth of it: {visible:?}");
     }
 
     /// The larger of two elements is drawn from near the smaller one: the same as with many segments between plain points.
