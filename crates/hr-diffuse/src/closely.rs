@@ -23,6 +23,15 @@ pub(crate) struct Closely<'a, L: LightField> {
     /// What leaves have found out, if they have, and by leaf: the position of its place among all, and where it lies from the middle.
     found: Option<(&'a Gather, Vec<(u32, Vec3)>)>,
     rays: AtomicU64,
+    unseen: AtomicU64,
+}
+
+/// What looking took, and what it spared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Looks {
+    pub(crate) rays: u64,
+    /// Of senders of which nothing was seen: what they would bring was not found out.
+    pub(crate) unseen: u64,
 }
 
 impl<'a, L: LightField> Closely<'a, L> {
@@ -34,12 +43,12 @@ impl<'a, L: LightField> Closely<'a, L> {
             });
             (gather, places)
         });
-        Self { light, links, found, rays: AtomicU64::new(0) }
+        Self { light, links, found, rays: AtomicU64::new(0), unseen: AtomicU64::new(0) }
     }
 
-    /// Rays shot so far.
-    pub(crate) fn rays(&self) -> u64 {
-        self.rays.load(Ordering::Relaxed)
+    /// So far.
+    pub(crate) fn looks(&self) -> Looks {
+        Looks { rays: self.rays.load(Ordering::Relaxed), unseen: self.unseen.load(Ordering::Relaxed) }
     }
 }
 
@@ -108,6 +117,7 @@ impl<L: LightField> Hierarchy for Closely<'_, L> {
         // Most is hidden: what it would bring is found out only where something of it is seen.
         let first = (arriving(Detail::rough()) != Rgb::ZERO).then(see);
         if first == Some(0.0) {
+            self.unseen.fetch_add(1, Ordering::Relaxed);
             return Some(Rgb::ZERO);
         }
         let irradiance = arriving(Detail::carried(0.0));
@@ -173,7 +183,8 @@ mod tests {
             let is_lit = solver.scene.normalization.to_scene(at.center).x < 0.5;
             assert_eq!(found, if is_lit { right } else { Rgb::ZERO }, "all of it or nothing, at {}", at.center);
         }
-        assert_eq!(closely.rays(), u64::from(element.child_count) * 256, "all are counted");
+        let looks = Looks { rays: u64::from(element.child_count) * 256, unseen: u64::from(element.child_count) / 2 };
+        assert_eq!(closely.looks(), looks, "all are counted");
     }
     /// A floor, half of which a sheet hides from a lamp: what leaves found out of each link against many rays.
     #[test]

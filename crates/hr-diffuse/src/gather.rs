@@ -358,6 +358,11 @@ impl Gather {
         self.push.spared_looks
     }
 
+    /// Looks that saw nothing of a sender, so that what it would bring was not found out.
+    pub(crate) fn unseen_senders(&self) -> u64 {
+        self.push.unseen_senders
+    }
+
     /// Where light arrives.
     pub(crate) fn places(&self) -> &Places {
         &self.push.places

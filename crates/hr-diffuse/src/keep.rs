@@ -435,7 +435,7 @@ impl Vertices {
 }
 
 /// Counters of [`Stats`].
-const COUNTERS: usize = 27;
+const COUNTERS: usize = 28;
 
 impl Stats {
     /// All counters, in the order in which they are kept.
@@ -475,6 +475,7 @@ impl Stats {
             steady_senders,
             faint_links,
             spared_looks,
+            unseen_senders,
             inner_vertices,
             // Of the pictures that were taken, not of the solution.
             unseen_vertices: _,
@@ -507,6 +508,7 @@ impl Stats {
             steady_senders,
             faint_links,
             spared_looks,
+            unseen_senders,
             inner_vertices,
             joined_leaves,
             shot_links,

@@ -111,6 +111,8 @@ pub(crate) struct Push {
     pub(crate) faint_links: u64,
     /// Looks at links that were left to chance, and not drawn.
     pub(crate) spared_looks: u64,
+    /// Looks that saw nothing of a sender, so that what it would bring was not found out.
+    pub(crate) unseen_senders: u64,
     /// Rays shot for places and weights.
     pub(crate) rays: u64,
     /// By place that has weights: how much more of its view is taken up than links and weights tell. Of the dark part of a bright sender,
@@ -147,6 +149,7 @@ impl Push {
             means,
             faint_links: 0,
             spared_looks: 0,
+            unseen_senders: 0,
             rays: 0,
             dim_views: Vec::new(),
             first: vec![0],
@@ -193,6 +196,7 @@ impl Push {
             for looked in threads::map_mut(part, 4, |_, part| push.find(light, links, part, look)) {
                 push.dim_views.push(looked.dim_view);
                 push.spared_looks += u64::from(looked.spared);
+                push.unseen_senders += u64::from(looked.unseen);
                 push.rays += u64::from(looked.rays);
             }
         }
@@ -233,6 +237,7 @@ impl Push {
             found.weight.keep(slot);
             looked.rays += found.rays;
             looked.spared += u32::from(found.spared);
+            looked.unseen += u32::from(found.unseen);
             if let Some(view) = found.view.filter(|_| Group::of(light, link.sender) == Group::Rest) {
                 looked.dim_view += view - found.weight.value * share(light, link, Spread::Exact);
             }
@@ -544,8 +549,10 @@ struct Found {
     view: Option<f32>,
     /// Rays that were shot.
     rays: u32,
-    /// Whether it was left to chance to look, which did not draw it.
+    /// Whether it was left to chance to look, which did not draw it, …
     spared: bool,
+    /// … or it looked, and saw nothing.
+    unseen: bool,
 }
 
 /// What a place found out about all of them.
@@ -557,6 +564,8 @@ struct Looked {
     rays: u32,
     /// Links that it did not look at, as others were drawn by chance.
     spared: u32,
+    /// Senders of which it saw nothing.
+    unseen: u32,
 }
 
 /// A place, and the points that stand for it.
@@ -722,7 +731,7 @@ impl Place {
         let rough = if shared && link.visibility >= 0.0 { self.roughly(light, link) } else { 0.0 };
         let first = (rough > 0.0).then(|| self.seen(light, link, rough * visible, before));
         if let Some((0.0, rays)) = first {
-            return Found { view: Some(0.0), rays, ..Found::default() };
+            return Found { view: Some(0.0), rays, unseen: true, ..Found::default() };
         }
         let (here, view) = if !shared {
             (Weight { value: mean, ..Weight::default() }, None)

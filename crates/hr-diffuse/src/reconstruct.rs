@@ -69,6 +69,8 @@ pub(crate) struct Cost {
     pub(crate) within: u64,
     /// … or as nobody sees them.
     pub(crate) unseen: u64,
+    /// Senders that were found hidden at a vertex, too, before it was found out what they would bring.
+    pub(crate) unseen_senders: u64,
 }
 
 /// Builds the vertices of a solution with a relative error, which has links to `places` of many leaves where these are known, and
@@ -93,7 +95,7 @@ pub(crate) fn reconstruct<L: LightField>(
     };
     let is_seen: Vec<bool> = (0..count as u32).map(is_seen).collect();
     let gathers = |vertex: u32| is_seen[vertex as usize] && !within.holds(vertex);
-    let mut rays = contacts.rays;
+    let (mut rays, mut unseen_senders) = (contacts.rays, 0);
     let chunk = BETWEEN_WATCHES * threads::current_num_threads();
     let mut covered = Vec::with_capacity(count);
     let mut sights = Vec::new();
@@ -134,7 +136,8 @@ pub(crate) fn reconstruct<L: LightField>(
             let mut others = contacts.places_around(&vertices, vertex as u32).into_iter();
             let again = |gathering: Gathering, place, looks| {
                 let other = gather(place, looks);
-                Gathering { rays: gathering.rays + other.rays, ..other }
+                let unseen_senders = gathering.unseen_senders + other.unseen_senders;
+                Gathering { rays: gathering.rays + other.rays, unseen_senders, ..other }
             };
             while gathering.covered
                 && let Some(place) = others.next()
@@ -149,6 +152,7 @@ pub(crate) fn reconstruct<L: LightField>(
         for (vertex, gathering) in (start..end).zip(part) {
             sights.extend(gathering.sight.map(|sight| (vertex, sight)));
             rays += u64::from(gathering.rays);
+            unseen_senders += u64::from(gathering.unseen_senders);
             vertices.irradiance[vertex] = gathering.irradiance;
             covered.push(gathering.covered);
             vertices.indirect[vertex] = gathering.indirect;
@@ -159,7 +163,7 @@ pub(crate) fn reconstruct<L: LightField>(
     uncover(&mut vertices, &covered, &is_seen);
     within.fill(light, &mut vertices);
     let unseen = is_seen.iter().filter(|&&is_seen| !is_seen).count() as u64;
-    (vertices, Cost { rays, within: within.count(), unseen })
+    (vertices, Cost { rays, within: within.count(), unseen, unseen_senders })
 }
 
 /// Adds what near senders bring as they are not as bright everywhere.
@@ -292,7 +296,7 @@ fn gather_at<L: LightField>(
     // What of both has been reflected.
     let mut reflected = [[Rgb::ZERO; 3], inherited.map(|brought| brought.indirect)];
     let [_, emitters, rest] = inherited.map(|brought| brought.share);
-    let (mut rays, mut row) = (0, Row { emitters, own: 0.0, inherited: rest });
+    let (mut rays, mut unseen_senders, mut row) = (0, 0, Row { emitters, own: 0.0, inherited: rest });
     let mut known_here: SmallVec<[u32; 64]> = SmallVec::new();
     let mut footprint: Option<Footprint> = None;
     let mut near_senders = SmallVec::new();
@@ -325,6 +329,7 @@ fn gather_at<L: LightField>(
             if was_hidden && visibility > 0.0 {
                 (irradiance, view) = closely(sender);
             }
+            unseen_senders += u32::from(was_hidden && visibility == 0.0);
         }
         let group = Group::of(light, sender);
         (if known { &mut own } else { &mut kept })[group as usize] += irradiance * visibility.abs();
@@ -355,7 +360,7 @@ fn gather_at<L: LightField>(
     let [known, others] = reflected;
     let indirect = (known[1] + others[1] + (known[2] + others[2] * inherited) * rest) * all;
     let sight = (!near_senders.is_empty()).then_some(Sight { at: x, normal: n, senders: near_senders, negligible });
-    Gathering { irradiance, indirect, rays, covered, sight }
+    Gathering { irradiance, indirect, rays, unseen_senders, covered, sight }
 }
 
 /// From where a vertex looks around.
@@ -487,6 +492,8 @@ struct Gathering {
     /// What of it has been reflected before.
     indirect: Rgb,
     rays: u32,
+    /// Senders of which it saw nothing.
+    unseen_senders: u32,
     covered: bool,
     sight: Option<Sight>,
 }

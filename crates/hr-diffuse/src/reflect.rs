@@ -4,7 +4,7 @@
 //! averages over all directions.
 
 use crate::clock::Instant;
-use crate::closely::Closely;
+use crate::closely::{Closely, Looks};
 use crate::columns::gains;
 use crate::face_clusters::FaceClusters;
 use crate::hierarchy::Elements;
@@ -440,14 +440,14 @@ impl<L: LightField> Solver<L> {
         changed.into_iter().map(|standing| standing.leaf).collect()
     }
 
-    /// What the extension makes of the incident light of leaves, in order, until `watch` breaks; and the rays that it took.
+    /// What the extension makes of the incident light of leaves, in order, until `watch` breaks; and what looking took.
     fn exitant_of(
         &self,
         leaves: &[Standing],
         new: Option<&[Rgb]>,
         shown: bool,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> (Vec<L::Exitant>, u64) {
+    ) -> (Vec<L::Exitant>, Looks) {
         let gather = Some(&self.gather).filter(|gather| shown && gather.is_for(&self.links));
         let (elements, closely) = (&self.elements, Closely::new(self.light(), &self.links, gather));
         let reflect = |&Standing { leaf, spread, negligible, error }: &Standing| {
@@ -476,7 +476,7 @@ impl<L: LightField> Solver<L> {
             }
             exitant.extend(threads::map(part, 1, reflect));
         }
-        (exitant, closely.rays())
+        (exitant, closely.looks())
     }
 
     /// Reflects the incident light of all leaves once more, of those too whose light no link asked for or was carried as
@@ -548,7 +548,7 @@ impl<L: LightField> Solver<L> {
         let progress = self.progress(Phase::Transport, 0.9);
         let (mut done, mut stopped) = (0, false);
         let chunk = BETWEEN_WATCHES * threads::current_num_threads();
-        let (exitant, rays) = self.exitant_of(&leaves, None, true, &mut || {
+        let (exitant, looks) = self.exitant_of(&leaves, None, true, &mut || {
             let share = (done as f32 / leaves.len() as f32).min(1.0);
             done += chunk;
             let answer = watch(&Progress { fraction: progress.fraction + 0.04 * share, ..progress });
@@ -557,7 +557,8 @@ impl<L: LightField> Solver<L> {
         });
         self.shown.extend(leaves.into_iter().map(|standing| standing.leaf).zip(exitant));
         self.stats.stopped |= stopped;
-        self.stats.vertex_rays += rays;
+        self.stats.vertex_rays += looks.rays;
+        self.stats.skipped.unseen_senders += looks.unseen;
         self.stats.seconds.reflect += start.elapsed().as_secs_f64();
     }
 

@@ -89,6 +89,7 @@ impl<L: LightField> Solver<L> {
         });
         self.stats.stopped |= stopped;
         self.stats.vertex_rays += cost.rays;
+        self.stats.skipped.unseen_senders += cost.unseen_senders;
         self.stats.skipped.inner_vertices = cost.within;
         self.stats.skipped.unseen_vertices = cost.unseen;
         for (leaf, exitant) in curved {

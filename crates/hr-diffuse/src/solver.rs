@@ -448,6 +448,7 @@ impl<L: LightField> Solver<L> {
         self.stats.rays += self.gather.rays();
         self.stats.skipped.faint_links = self.gather.faint_links();
         self.stats.skipped.spared_looks += self.gather.spared_looks();
+        self.stats.skipped.unseen_senders += self.gather.unseen_senders();
         self.stats.seconds.transport += start.elapsed().as_secs_f64();
     }
 

@@ -79,6 +79,8 @@ pub struct Skipped {
     pub faint_links: u64,
     /// Looks from leaves at links that hardly let anything through, left to those that were drawn by chance.
     pub spared_looks: u64,
+    /// Looks at senders of which rays saw nothing: what they would bring there is not found out.
+    pub unseen_senders: u64,
     /// Vertices that gather nothing, as they lie within a place of many leaves that gathered for them.
     pub inner_vertices: u64,
     /// Vertices that gather nothing, as pictures do not show them.
@@ -103,6 +105,7 @@ impl std::ops::AddAssign for Skipped {
         self.steady_senders += other.steady_senders;
         self.faint_links += other.faint_links;
         self.spared_looks += other.spared_looks;
+        self.unseen_senders += other.unseen_senders;
         self.inner_vertices += other.inner_vertices;
         self.unseen_vertices += other.unseen_vertices;
         self.unseen_leaves += other.unseen_leaves;

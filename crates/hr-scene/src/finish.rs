@@ -67,7 +67,8 @@ impl Scene {
         self.attributes.dedup_by_key(|a| a.surface);
         self.drop_unusable_lights_and_cameras(&mut counts);
         self.warnings.extend(counts.0);
-        self.leave_out_vanishing();
+        let given: Vec<usize> = (0..moved.len()).filter(|&given| moved[given].is_some()).collect();
+        self.leave_out_vanishing(|surface| given[surface]);
         if self.surfaces.is_empty() {
             return Err(SceneError::empty(self.name, &self.warnings));
         }
@@ -75,8 +76,8 @@ impl Scene {
     }
 
     /// Leaves out, with a counted [`Warning`], surfaces so small that nothing is left of them where the scene's extent is 1, in single
-    /// precision, as solvers have it.
-    pub(crate) fn leave_out_vanishing(&mut self) {
+    /// precision, as solvers have it. `given` tells which surface of what was given each one is.
+    pub(crate) fn leave_out_vanishing(&mut self, given: impl Fn(usize) -> usize) {
         let normalization = Normalization::new(&self.surfaces);
         let vanishes = |surface: &Surface| {
             matches!(Geometry::from_surface(surface, &normalization), Err(GeometryError::Vanishing))
@@ -85,7 +86,7 @@ impl Scene {
         let Some(first) = stays.iter().position(|stays| !stays) else { return };
         let mut counts = Counts::default();
         for _ in stays.iter().filter(|stays| !**stays) {
-            counts.add(VANISHING, || format!("{}: surface {first}", self.name));
+            counts.add(VANISHING, || format!("{}: surface {}", self.name, given(first)));
         }
         self.warnings.extend(counts.0);
         self.keep_surfaces(&stays);
@@ -488,10 +489,13 @@ mod tests {
         let before = scene.surfaces.clone();
         let speck = [DVec3::ZERO, DVec3::X * 1e-12, DVec3::Y * 1e-12].map(|corner| corner + DVec3::splat(0.3));
         scene.surfaces.insert(1, Surface::new(Shape::Triangle(speck), 0));
+        // What is left out before it does not change which one it is.
+        scene.surfaces.insert(0, before[0].clone());
+        scene.surfaces.insert(0, Surface::new(Shape::Triangle([DVec3::NAN; 3]), 0));
         let scene = scene.finish().expect("the rest is there");
         assert_eq!(scene.surfaces, before, "all but the speck");
         let told = scene.warnings.iter().filter(|warning| warning.text == VANISHING).collect::<Vec<_>>();
         assert_eq!(told.len(), 1, "{:?}", scene.warnings);
-        assert_eq!((told[0].count, told[0].first.as_str()), (1, "cornell: surface 1"), "{told:?}");
+        assert_eq!((told[0].count, told[0].first.as_str()), (1, "cornell: surface 3"), "{told:?}");
     }
 }

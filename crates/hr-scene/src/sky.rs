@@ -33,7 +33,7 @@ impl Scene {
         });
         self.surfaces.push(Surface { flip: true, ..Surface::new(Shape::Sphere { center, radius }, material) });
         // The scene is wider now.
-        self.leave_out_vanishing();
+        self.leave_out_vanishing(|surface| surface);
         Ok(())
     }
 

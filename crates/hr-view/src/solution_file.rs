@@ -25,7 +25,7 @@ use xxhash_rust::xxh3::Xxh3;
 const MAGIC: u64 = u64::from_le_bytes(*b"hr-light");
 
 /// Counts up with every change of what the arrays are or mean.
-const VERSION: u64 = 19;
+const VERSION: u64 = 20;
 
 /// Why a solution cannot be loaded.
 #[derive(Debug, thiserror::Error)]

@@ -74,6 +74,7 @@ pub fn stats(solved: &Solved, accuracy: Accuracy, times: &Times, spared: Spared)
             "steady_senders": skipped.steady_senders,
             "faint_links": skipped.faint_links,
             "spared_looks": skipped.spared_looks,
+            "unseen_senders": skipped.unseen_senders,
             "inner_vertices": skipped.inner_vertices,
             "unseen_vertices": skipped.unseen_vertices,
             "unseen_leaves": skipped.unseen_leaves,

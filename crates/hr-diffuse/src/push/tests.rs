@@ -72,6 +72,7 @@ fn looks_that_are_spared_are_made_up_for() {
     let of = |error| Push::new(light, links, Some(Aim::of(error)), (u64::MAX, None), &mut || ControlFlow::Continue(()));
     let (some, all) = (of(ERROR), of(0.0));
     assert_eq!(all.spared_looks, 0, "all is looked at");
+    assert!(all.unseen_senders > 0, "balls hide each other");
     let looks = some.weights.len() as u64;
     assert!(10 * some.spared_looks > looks, "{} of {looks} are spared", some.spared_looks);
     // Many places would draw more looks than they may: theirs are made rarer.
