@@ -21,6 +21,8 @@ const WITHIN_OPEN: f64 = 0.8;
 const CLOSED: f64 = 0.9;
 /// How much better a view from outside must be to be taken in place of one from inside of a closed room.
 const INSIDE: f64 = 1.5;
+/// Area that faces +z and has no opposite, as a share of all that faces along y and z, from which it is a solid's ground.
+const GROUND_SHARE: f64 = 0.1;
 /// Surfaces larger by this factor than all that is smaller are ground, or sky: what stands on it is looked at.
 const GROUND: f64 = 4.0;
 /// Field of view of a default camera across, inside and outside, degrees.
@@ -36,9 +38,10 @@ impl Scene {
         bounds_of(&self.surfaces)
     }
 
-    /// Which way is up: that of the first camera; else +y for glTF files, which say so; else (MGF, OBJ: their files do
-    /// not tell) +y or +z, whichever has more floor and ceiling, that is, polygon area facing along it. Area of floors that
-    /// no ceiling is opposite to counts twice: walls come in pairs.
+    /// Which way is up: that of the first camera; else +y for glTF files, which say so. MGF and OBJ files do not tell:
+    /// +y or +z, whichever has more floor and ceiling, that is, polygon area facing along it; area of floors that no
+    /// ceiling is opposite to counts twice, since walls come in pairs. In OBJ files of solids every face is one of a pair,
+    /// which tells nothing: +y, as most programs write them, unless there is a ground that faces +z.
     #[must_use]
     pub fn up(&self) -> DVec3 {
         if let Some((_, camera)) = self.cameras.first() {
@@ -50,32 +53,52 @@ impl Scene {
         }
         let (mut both, mut net) = (DVec3::ZERO, DVec3::ZERO);
         for surface in &self.surfaces {
-            let area = match &surface.shape {
-                Shape::Triangle([a, b, c]) => (*b - *a).cross(*c - *a) * 0.5,
-                Shape::Quad([a, b, c, d]) => (*c - *a).cross(*d - *b) * 0.5,
-                Shape::Ring { normal, inner, outer, .. } => *normal * (PI * (outer * outer - inner * inner)),
-                Shape::Sphere { .. } | Shape::Cone { .. } | Shape::Torus { .. } => continue,
-            };
+            let Some((_, area)) = flat(&surface.shape) else { continue };
             // Only what faces along an axis: slopes and rounded things tell nothing.
             if (area / area.length()).abs().max_element() > 0.95 {
                 both += area.abs();
                 net += if surface.flip { -area } else { area };
             }
         }
-        let DVec3 { y, z, .. } = both + net.abs();
-        if y >= z { DVec3::Y } else { DVec3::Z }
+        let horizontal = net.abs()
+            + if name.ends_with(".obj") && self.is_solid() {
+                DVec3::Y * (GROUND_SHARE * (both.y + both.z))
+            } else {
+                both
+            };
+        if horizontal.y >= horizontal.z { DVec3::Y } else { DVec3::Z }
+    }
+
+    /// Whether flat surfaces and spheres face outward on the whole, so that they enclose a positive volume: an object, or
+    /// a house whose walls have two sides each. A room of walls that face inward encloses a negative one.
+    fn is_solid(&self) -> bool {
+        let (low, high) = self.bounds().unwrap_or_default();
+        let center = low + (high - low) * 0.5;
+        // Gauss's theorem: a third of the flux of the position.
+        let volume = |surface: &Surface| {
+            let outward = match &surface.shape {
+                Shape::Sphere { radius, .. } => 4.0 * PI / 3.0 * radius.powi(3),
+                // All points of a plane have the same part along its normal.
+                shape => flat(shape).map_or(0.0, |(point, area)| (point - center).dot(area) / 3.0),
+            };
+            if surface.flip { -outward } else { outward }
+        };
+        self.surfaces.iter().map(volume).sum::<f64>() > 0.0
     }
 
     /// A camera for a scene that brings none: of some places inside, at eye height, and some around it, with everything in
-    /// view but a wide ground, that from which most can be seen that is lit, by the sky where nothing shines. In a closed room it is one inside. 640 x 400
-    /// pixels. Where the scene has cameras, it is the first one.
+    /// view but a wide ground, that from which most can be seen that is lit, by the sky where nothing shines. In a closed
+    /// room it is one inside; about a solid that has no lamps, one outside. 640 x 400 pixels. Where the scene has cameras,
+    /// it is the first one.
     #[must_use]
     pub fn default_camera(&self) -> Camera {
         if let Some((_, camera)) = self.cameras.first() {
             return *camera;
         }
         let sight = Sight::of(self);
-        let candidates = self.inside(&sight).into_iter().chain(self.around());
+        // Where only the sky gives light, solids are dark within, and meant to be seen from outside.
+        let inside = if sight.has_lamps() || !self.is_solid() { self.inside(&sight) } else { Vec::new() };
+        let candidates = inside.into_iter().chain(self.around());
         // The first of equals, so that those that are named first are preferred.
         let mut best: Option<(f64, Camera)> = None;
         for (worth, camera) in candidates {
@@ -370,6 +393,18 @@ fn shape_bounds(shape: &Shape) -> (DVec3, DVec3) {
     }
 }
 
+/// A point and area times normal, not flipped, of what is flat.
+fn flat(shape: &Shape) -> Option<(DVec3, DVec3)> {
+    match shape {
+        Shape::Triangle([a, b, c]) => Some((*a, (*b - *a).cross(*c - *a) * 0.5)),
+        Shape::Quad([a, b, c, d]) => Some((*a, (*c - *a).cross(*d - *b) * 0.5)),
+        Shape::Ring { center, normal, inner, outer } => {
+            Some((*center, *normal * (PI * (outer * outer - inner * inner))))
+        }
+        Shape::Sphere { .. } | Shape::Cone { .. } | Shape::Torus { .. } => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -397,6 +432,23 @@ mod tests {
         file.name = "flat.GLB".into();
         assert_eq!(file.up(), DVec3::Y, "glTF says y");
         assert_eq!(builtin::scene("cornell").expect("there").up(), DVec3::Y, "the camera says y");
+    }
+
+    #[test]
+    fn solids_stand_upright() {
+        let cupboard = |ground: &[Surface]| {
+            let faces = open_box(DVec3::ZERO, DVec3::new(2.0, 1.8, 0.6), &[]);
+            let faces = faces.into_iter().map(|s| Surface { flip: true, ..s });
+            let mut scene = lit(faces.chain(ground.iter().cloned()).collect());
+            scene.name = "cupboard.obj".into();
+            scene
+        };
+        assert_eq!(cupboard(&[]).up(), DVec3::Y, "its large doors are not its top");
+        let inward = Scene { surfaces: open_box(DVec3::ZERO, DVec3::new(2.0, 1.8, 0.6), &[]), ..cupboard(&[]) };
+        assert_eq!(inward.up(), DVec3::Z, "of a room, large walls are floor and ceiling");
+        let [a, b, c, d] = [(-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0)].map(|(x, y)| DVec3::new(x, y, -0.1));
+        let ground = Surface::new(Shape::Quad([a, b, c, d]), 0);
+        assert_eq!(cupboard(&[ground]).up(), DVec3::Z, "a ground tells");
     }
 
     #[test]
@@ -543,6 +595,8 @@ mod tests {
         };
         let open = dark(walls(DVec3::ZERO, at(1.0, 0.3, 0.7), &[3]));
         assert!(!within(&open), "a tray is looked at from outside: {:?}", open.default_camera());
+        let deep = dark(walls(DVec3::ZERO, at(1.0, 5.0, 1.0), &[3]));
+        assert!(!within(&deep), "so is a bin: {:?}", deep.default_camera());
         let closed = dark(walls(DVec3::ZERO, at(1.0, 1.5, 0.7), &[]));
         assert!(!within(&closed), "a cupboard is dark inside: {:?}", closed.default_camera());
         let yard = dark(open_box(DVec3::ZERO, at(10.0, 10.0, 10.0), &[3]));
