@@ -3,7 +3,8 @@
 //! Read: polygons with any number of corners (planar convex quadrilaterals stay whole), normals, texture coordinates,
 //! vertex colours after the coordinates, materials: `Kd`, `Ks`, `Ns` (diffuse and energy-normalised Phong), `Ke`
 //! (radiance in W/(m² sr)), `map_Kd` with its `-s`, `-o` and `-clamp`, and `Pr`, `Pm` of the PBR extension, which make
-//! it metallic-roughness. Colours are taken as linear Rec. 709, but images as sRGB. The format does not know
+//! it metallic-roughness. Most files' Ks is no reflectance: where Kd + Ks exceeds 1 anywhere in a library, its highlights
+//! are the classic, not normalised ones, whose reflectance is 8 Ks / (Ns + 8). Colours are taken as linear Rec. 709, but images as sRGB. The format does not know
 //! sides: all faces reflect on both, and emit on the side from which they are counter-clockwise.
 //!
 //! The parser is our own: it knows line numbers, keeps double precision and quadrilaterals, and takes lines for what

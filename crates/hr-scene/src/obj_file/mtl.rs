@@ -22,7 +22,7 @@ const DEFAULT_ROUGHNESS: f32 = 0.5;
 /// Largest Phong exponent: a lobe of 0.1°.
 const MAX_EXPONENT: f32 = 1e6;
 
-/// A material as its statements give it; Kd and Ks scaled to at most 1 in sum.
+/// A material as its statements give it, but that the reflectances `diffuse` and `specular` are at most 1 in sum.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Source {
     name: String,
@@ -86,34 +86,64 @@ impl Library {
                 _ => {}
             }
         }
-        for material in &mut self.materials[first..] {
-            material.tame(path, warnings);
+        let added = &mut self.materials[first..];
+        for material in &mut *added {
+            material.tame();
+        }
+        if let Some(bright) = added.iter().find(|m| m.largest() > 1.0) {
+            let name = &bright.name;
+            warnings.add(
+                format!(
+                    "Kd + Ks is more than 1 (material '{name}'), so Ks is read as the classic model's factor, that is, \
+                         a reflectance of 8 Ks / (Ns + 8)"
+                ),
+                || path.display().to_string(),
+            );
+            added.iter_mut().for_each(Source::read_as_classic);
+        }
+        for material in added {
+            material.conserve_energy(path, warnings);
         }
         Ok(())
     }
 }
 
 impl Source {
-    /// Brings numbers into their ranges.
-    fn tame(&mut self, path: &Path, warnings: &mut Warnings) {
-        let place = || format!("{}: {}", path.display(), self.name);
+    /// Brings numbers into their ranges, each by itself.
+    fn tame(&mut self) {
         let unit = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) };
         let positive = |c: Rgb| Rgb::from(c.to_array().map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 }));
-        let diffuse = positive(self.diffuse.unwrap_or(Rgb::splat(GREY)));
+        self.diffuse = Some(positive(self.base_color()));
         // Illumination models 0 and 1 have no highlight.
         let matte = matches!(self.illumination, Some(0 | 1));
-        let specular = if matte || self.is_pbr() { Rgb::ZERO } else { positive(self.specular) };
-        let largest = (diffuse + specular).max_element();
-        if largest > 1.0 {
-            warnings.add("Kd + Ks is scaled to at most 1: no surface reflects more than it receives", place);
-        }
-        let scale = 1.0 / largest.max(1.0);
-        self.diffuse = Some(diffuse * scale);
-        self.specular = specular * scale;
+        self.specular = if matte || self.is_pbr() { Rgb::ZERO } else { positive(self.specular) };
         self.exponent = if self.exponent.is_nan() { 0.0 } else { self.exponent.clamp(0.0, MAX_EXPONENT) };
         self.radiance = positive(self.radiance);
         self.roughness = self.roughness.map(unit);
         self.metallic = self.metallic.map(unit);
+    }
+
+    /// What is reflected of the brightest channel, if Ks is a reflectance.
+    fn largest(&self) -> f32 {
+        (self.base_color() + self.specular).max_element()
+    }
+
+    /// Takes Ks as the factor of cos^Ns of the half vector's angle, as the format's illumination model 2 has it: not
+    /// normalised, so that the lobe's reflectance falls with Ns. Near the mirror direction that is a Phong lobe of a
+    /// fourth of the exponent (Fisher and Woo, "R.E versus N.H specular highlights", Graphics Gems IV, 1994).
+    fn read_as_classic(&mut self) {
+        self.exponent *= 0.25;
+        self.specular *= 2.0 / (self.exponent + 2.0);
+    }
+
+    fn conserve_energy(&mut self, path: &Path, warnings: &mut Warnings) {
+        let largest = self.largest();
+        if largest > 1.0 {
+            let place = || format!("{}: {}", path.display(), self.name);
+            warnings.add("Kd and Ks are scaled to at most 1: no surface reflects more than it receives", place);
+            self.diffuse = Some(self.base_color() / largest);
+            self.specular /= largest;
+        }
     }
 
     fn is_pbr(&self) -> bool {

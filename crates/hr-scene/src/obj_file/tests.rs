@@ -2,7 +2,9 @@ use super::*;
 use crate::testing::Folder;
 use hr_diffuse::Shape;
 use proptest::prelude::*;
+use std::f32::consts::PI;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 fn write(folder: &Folder, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
     let path = folder.path(name);
@@ -107,15 +109,15 @@ fn materials() {
     let material = |statements: &str| with_material(&folder, statements).expect("valid").materials.remove(0);
     let plain = material("Kd 0.2 0.4 0.6\nKe 1 2 3\nNs 20\nKs 0.1 0.1 0.1\n");
     assert_eq!((plain.name.as_str(), plain.base_color), ("m", Rgb::new(0.2, 0.4, 0.6)), "Kd");
-    let pi = std::f32::consts::PI;
-    assert!(close(plain.exitance / pi, [1.0, 2.0, 3.0]), "Ke is radiance");
+    assert!(close(plain.exitance / PI, [1.0, 2.0, 3.0]), "Ke is radiance");
     assert!(close(plain.reflector.diffuse(), [0.2, 0.4, 0.6]), "the diffuse part");
     assert_eq!(material("Kd 0.3\n").base_color, Rgb::splat(0.3), "one number is grey");
     let metal = material("Kd 0.9 0.8 0.1\nPm 1\nPr 0.2\n");
     assert_eq!(metal.reflector.diffuse(), Rgb::ZERO, "a metal has no diffuse part");
-    let bright = with_material(&folder, "Kd 1 0.5 0\nKs 1 1 1\nNs 10\n").expect("valid");
-    assert!(warned(&bright, "Kd + Ks"), "{:?}", bright.warnings);
-    assert!(close(bright.materials[0].base_color, [0.5, 0.25, 0.0]), "scaled to 1");
+    let bright = with_material(&folder, "Kd 1 0.5 0\nKs 1 1 1\nNs 8\n").expect("valid");
+    assert!(warned(&bright, "classic") && warned(&bright, "scaled to at most 1"), "{:?}", bright.warnings);
+    let [base, total] = [bright.materials[0].base_color, Rgb::new(2.0, 1.0, 0.0) / 3.0];
+    assert!(close(base, total.to_array()), "half of Ks, then all scaled to 1: {base}");
     let matte = with_material(&folder, "Kd 1 0.5 0\nKs 1 1 1\nillum 1\n").expect("valid");
     assert!(close(matte.materials[0].base_color, [1.0, 0.5, 0.0]), "no highlight in model 1");
     let odd = with_material(&folder, "Kd spectral a.rfl\nd 0.5\nmap_Bump x.png\nKe nan -1 inf\n").expect("valid");
@@ -123,6 +125,25 @@ fn materials() {
     assert_eq!(odd.materials[0].exitance, Rgb::ZERO, "only numbers shine");
     let error = with_material(&folder, "Kd 0.1 0.2 x\n").expect_err("no number").to_string();
     assert!(error.contains("a.mtl:2: 'x' is no number"), "{error}");
+}
+
+/// Ks of files that would reflect more than they receive are factors of lobes that are not normalised, in all materials
+/// of the file: radiance at the peak is Ks / π times irradiance.
+#[test]
+fn highlights_of_the_classic_model() {
+    let folder = Folder::new("obj-classic");
+    let peak = |statements: &str| {
+        let scene = with_material(&folder, statements).expect("valid");
+        let reflector = Arc::clone(&scene.materials[0].reflector);
+        let lobe = PI * reflector.glossy(Vec3::Z, Vec3::Z);
+        (lobe.x, reflector.directional_albedo(Vec3::Z).x, warned(&scene, "classic"))
+    };
+    let wood = "Kd 0.4 0.3 0.2\nKs 0.5 0.5 0.5\nNs 96\n";
+    let (lobe, albedo, classic) = peak(wood);
+    assert!(!classic && (lobe - 0.5 * 98.0 / 2.0).abs() < 0.01 && (albedo - 0.5).abs() < 1e-3, "{lobe} {albedo}");
+    let (lobe, albedo, classic) = peak(&format!("{wood}newmtl white\nKd 0.8 0.8 0.8\nKs 0.5 0.5 0.5\nNs 20\n"));
+    assert!(classic && (lobe - 0.5).abs() < 1e-4, "{lobe}");
+    assert!((albedo - 0.5 * 8.0 / 104.0).abs() < 1e-3, "{albedo}");
 }
 
 #[test]
