@@ -16,6 +16,10 @@ const UNCERTAIN: [f32; 3] = [0.02, 0.1, 0.5];
 /// No light is raised by more than this: where more is missing, it is not known from where.
 const MOST_RAISE: f32 = 3.0;
 
+/// A row of less than this share of an enclosure is left alone: what is missing is too dim to have been looked at, and would become as bright
+/// as what is known.
+const MOSTLY_KNOWN: f32 = 0.8;
+
 /// No leaf sees more than all there is, but its few rays may say so: a sum is cut off above this. Cut off at 1, what errs to
 /// the other side would be left alone, and light be lost; so it is the mean over a side of a surface that is kept below 1.
 const MOST_SEEN: f32 = 1.1;
@@ -32,6 +36,16 @@ struct LeafRow {
 impl LeafRow {
     fn sum(&self) -> f32 {
         self.shares.iter().sum()
+    }
+
+    /// What the sum is to be: where nothing but senders is seen, `closed` by all of the view but their dark parts, 1 less these. Leaves of
+    /// which nothing is covered have so much of their sums that on average over a side there is no more than all there is to see.
+    fn goal(&self, closed: Option<f32>, share: f32) -> f32 {
+        match closed {
+            _ if self.exposed < 1.0 => self.sum().min(self.exposed),
+            Some(dim) if self.sum() >= MOSTLY_KNOWN => 1.0 - dim.min(1.0),
+            _ => (share * self.sum()).min(MOST_SEEN),
+        }
     }
 
     /// Factors for the light of [lights without extent, and of each of the shares] that make the row's sum what it is to be; the
@@ -100,11 +114,8 @@ pub(crate) fn balance<L: LightField>(
         let most = if sum > area { area / sum } else { 1.0 };
         let factors = |&index: &u32| {
             let row = row(index);
-            row.factors(match row.exposed >= 1.0 {
-                true if closed => 1.0 - dim_views.get(index as usize).map_or(0.0, |dim| dim.min(1.0)),
-                true => (most * row.sum()).min(MOST_SEEN),
-                false => row.sum().min(row.exposed),
-            })
+            let dim = dim_views.get(index as usize).copied().unwrap_or_default();
+            row.factors(row.goal(closed.then_some(dim), most))
         };
         side.iter().map(factors).collect::<Vec<_>>()
     };
@@ -148,6 +159,19 @@ mod tests {
         assert!((emitters * 0.9 - 1.0).abs() < 1e-6 && rest.is_finite(), "nothing else could be what is missing");
         let [.., faint] = factors([0.1, 0.1, 0.01], 1.0);
         assert!(faint <= MOST_RAISE, "so much may be missing elsewhere: {faint}");
+    }
+
+    /// In an enclosure what is missing of a row is in what is seen; but if that is much, it is dark, and what is bright is not raised for it.
+    #[test]
+    fn rows_of_which_little_is_known_are_left_alone() {
+        let goal = |shares, closed| LeafRow { shares, exposed: 1.0 }.goal(closed, 0.5);
+        assert_eq!(goal([0.2, 0.7, 0.0], Some(0.0)), 1.0, "it is nearly whole");
+        assert_eq!(goal([0.2, 0.7, 0.0], Some(0.3)), 0.7, "parts of senders are dark");
+        assert_eq!(goal([0.2, 0.7, 0.0], None), 0.45, "the whole side has too much");
+        let hidden = [0.2, 0.05, 0.02];
+        assert_eq!(goal(hidden, Some(0.0)), 0.135, "nobody looked at what takes up most of the view");
+        let raised = LeafRow { shares: hidden, exposed: 1.0 }.factors(1.0)[1];
+        assert!(raised > 2.0, "though it would change emitters: {raised}");
     }
 
     #[test]
