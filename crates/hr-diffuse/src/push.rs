@@ -70,6 +70,9 @@ const MOST_WEIGHT: f32 = 64.0;
 const RAYS: f32 = 64.0;
 const LEAST_RAYS: f32 = 2.0;
 const MOST_RAYS: f32 = 16.0;
+/// Where looks at emitters see less than links let through, as within solids of which much more lies outside of what such a link is for, it is
+/// so for other emitters, too: after so many rays half as many are shot if all were to see them, and none did.
+const BELIEVED_RAYS: f32 = 32.0;
 /// Links none of whose segments was free let so much through, of which each leaf finds out what is true, …
 const LEAST_VISIBLE: f32 = 0.01;
 /// … and where leaves look at links of their own, at least so much is what rays are shot for.
@@ -224,7 +227,7 @@ impl Push {
             let find = || match look {
                 Look::Roughly => plain(),
                 Look::Beyond(known) if known.rough => plain(),
-                _ => place.weight(light, link, (self.means[at], outlook, rarer), looked.rays),
+                _ => place.weight(light, link, (self.means[at], outlook, rarer), &looked),
             };
             let brings = self.means[at] * visible(link, Spread::Exact);
             let known = known.as_mut().and_then(|known| known.take(light, link, (brings, place.uneven)));
@@ -238,6 +241,9 @@ impl Push {
             looked.rays += found.rays;
             looked.spared += u32::from(found.spared);
             looked.unseen += u32::from(found.unseen);
+            if Group::of(light, link.sender) == Group::Emitter {
+                looked.emitters.add(visible(link, Spread::Exact), &found);
+            }
             if let Some(view) = found.view.filter(|_| Group::of(light, link.sender) == Group::Rest) {
                 looked.dim_view += view - found.weight.value * share(light, link, Spread::Exact);
             }
@@ -547,8 +553,10 @@ struct Found {
     weight: Weight,
     /// The share of the view that what is seen of the sender takes up, if the place asked.
     view: Option<f32>,
-    /// Rays that were shot.
+    /// Rays that were shot, …
     rays: u32,
+    /// … and how many of them saw the sender.
+    free: f32,
     /// Whether it was left to chance to look, which did not draw it, …
     spared: bool,
     /// … or it looked, and saw nothing.
@@ -566,6 +574,28 @@ struct Looked {
     spared: u32,
     /// Senders of which it saw nothing.
     unseen: u32,
+    /// How far links to emitters told what it saw of them.
+    emitters: Told,
+}
+
+/// Rays that saw senders, of those that were to see them as far as links tell.
+#[derive(Clone, Copy, Default)]
+struct Told {
+    expected: f32,
+    free: f32,
+}
+
+impl Told {
+    /// Adds what was found of a link that lets so much through.
+    fn add(&mut self, visible: f32, found: &Found) {
+        self.expected += visible * found.rays as f32;
+        self.free += found.free;
+    }
+
+    /// So much of what links tell is to be expected of the next one.
+    fn share(&self) -> f32 {
+        ((BELIEVED_RAYS + self.free) / (BELIEVED_RAYS + self.expected)).min(1.0)
+    }
 }
 
 /// A place, and the points that stand for it.
@@ -705,14 +735,14 @@ impl Place {
         may_bring * outlook.turned < self.faint && (outlook.far || is_faint_to_all())
     }
 
-    /// What a link brings to the place over what it brings to its receiver, after so many rays shot `before`; `mean` is what the link would
+    /// What a link brings to the place over what it brings to its receiver, after what others told `before`; `mean` is what the link would
     /// bring to its receiver if it were wholly visible, and what is left to chance is so much `rarer`.
     fn weight<L: LightField>(
         &self,
         light: Light<'_, L>,
         link: &Link,
         (mean, outlook, rarer): (f32, Outlook, f32),
-        before: u32,
+        before: &Looked,
     ) -> Found {
         let element = light.element(self.node);
         let flat = element.is_flat();
@@ -729,7 +759,10 @@ impl Place {
         }
         // Most of what is near is hidden: what it would bring is found out only where something of it is seen.
         let rough = if shared && link.visibility >= 0.0 { self.roughly(light, link) } else { 0.0 };
-        let first = (rough > 0.0).then(|| self.seen(light, link, rough * visible, before));
+        let is_emitter = Group::of(light, link.sender) == Group::Emitter;
+        let likely = if is_emitter { before.emitters.share() } else { 1.0 };
+        let look = |brings: f32| self.seen(light, link, (brings, likely), before.rays);
+        let first = (rough > 0.0).then(|| look(rough * visible));
         if let Some((0.0, rays)) = first {
             return Found { view: Some(0.0), rays, unseen: true, ..Found::default() };
         }
@@ -749,16 +782,18 @@ impl Place {
             (Weight { value: brought.x, ..Weight::default() }, Some(brought.y))
         };
         if here.value <= 0.0 {
-            return Found { rays: first.map_or(0, |(_, rays)| rays), ..Found::default() };
+            let (seen, rays) = first.unwrap_or_default();
+            return Found { rays, free: seen * rays as f32, ..Found::default() };
         }
         let weight = here * ((here.value / mean).min(MOST_WEIGHT) / here.value);
         if link.visibility < 0.0 {
             return Found { weight, view: view.map(|view| view * visible), ..Found::default() };
         }
         let worth = if shared { visible } else { visible.max(LEAST_WORTH) };
-        let (seen, rays) = first.unwrap_or_else(|| self.seen(light, link, here.value * worth, before));
+        let (seen, rays) = first.unwrap_or_else(|| look(here.value * worth));
+        let free = seen * rays as f32;
         let seen = seen / chance;
-        Found { weight: weight * (seen / visible), view: view.map(|view| view * seen), rays, ..Found::default() }
+        Found { weight: weight * (seen / visible), view: view.map(|view| view * seen), rays, free, ..Found::default() }
     }
 
     /// About what a link brings where it is wholly visible: as much as tells how many rays it is worth.
@@ -779,12 +814,19 @@ impl Place {
         (is_hardly_visible && is_reflected && is_shared(light, link.receiver)).then(chance)
     }
 
-    /// Share of a link's sender that the place sees, by as many rays as what it `brings` is worth, and their number. The rays of all
-    /// links go on with one sequence of points, so that they are spread evenly over the place.
-    fn seen<L: LightField>(&self, light: Light<'_, L>, link: &Link, brings: f32, before: u32) -> (f32, u32) {
-        let irradiance = light.exitant.irradiance[self.node as usize].element_sum();
-        let rays = self.aim.effort * RAYS * brings / irradiance.max(f32::MIN_POSITIVE);
-        let rays = rays.clamp(LEAST_RAYS, self.aim.effort * MOST_RAYS) as u32;
+    /// Share of a link's sender that the place sees, by as many rays as what it `brings` is worth if that is `likely`, and their number. The
+    /// rays of all links go on with one sequence of points, so that they are spread evenly over the place.
+    fn seen<L: LightField>(
+        &self,
+        light: Light<'_, L>,
+        link: &Link,
+        (brings, likely): (f32, f32),
+        before: u32,
+    ) -> (f32, u32) {
+        let [here, all] = [self.node, 0].map(|node| light.exitant.irradiance[node as usize].element_sum());
+        let irradiance = here.max(DIMMEST_SHARE * all);
+        let rays = self.aim.effort * (RAYS * brings / irradiance.max(f32::MIN_POSITIVE)).min(MOST_RAYS);
+        let rays = (rays * likely).max(LEAST_RAYS) as u32;
         let (mut blocker, seed) = (u32::MAX, hash(self.node, 0x1eaf));
         let sequence = (seed, before..before + rays);
         let (seen, total, rays) = visibility(light, self.node, link.sender, sequence, (&Proof::Unknown, &mut blocker));

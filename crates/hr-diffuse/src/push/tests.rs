@@ -1,5 +1,6 @@
 use super::{
-    DIMMEST_SHARE, FAINT_SHARE, HARDLY_VISIBLE, LEAST_VISIBLE, Place, Push, Spread, is_shared, spreads, visible,
+    DIMMEST_SHARE, FAINT_SHARE, Found, HARDLY_VISIBLE, LEAST_VISIBLE, Looked, Place, Push, Spread, Told, is_shared,
+    spreads, visible,
 };
 use crate::effort::Aim;
 use crate::gather::{GROUPS, Group};
@@ -199,7 +200,7 @@ fn what_is_faint_to_a_wall_counts_in_the_dark() {
         let rays = |&at: &usize| {
             let link = &links[at];
             let mean = light.emitted_toward(link).element_sum() * link.factor;
-            place.weight(light, link, (mean, place.outlook(light, link, mean), 1.0), 0).rays
+            place.weight(light, link, (mean, place.outlook(light, link, mean), 1.0), &Looked::default()).rays
         };
         let own = above(&solver, leaf);
         counted.iter().filter(|&&at| own.contains(&links[at].receiver)).map(rays).sum::<u32>()
@@ -207,4 +208,37 @@ fn what_is_faint_to_a_wall_counts_in_the_dark() {
     assert!(looks(dark) > 0, "the dark leaf looks");
     let others = places.nodes.iter().filter(|&&place| place != dark && reflects(&place));
     assert_eq!(others.map(|&place| looks(place)).sum::<u32>(), 0, "all others have light enough");
+}
+
+/// A place that saw less of emitters than links let through takes fewer rays for the others, and as many where it saw as much; what it is told
+/// of the emitters of which it sees all or nothing is the same.
+#[test]
+fn emitters_that_others_hid_are_worth_few_rays() {
+    let solver = solve(&room(), ERROR, (), Skips::ALL);
+    let (light, links, aim) = (solver.light(), &solver.links, Aim::of(ERROR));
+    let push = Push::new(light, links, Some(aim), (u64::MAX, None), &mut || ControlFlow::Continue(()));
+    let looks = |told: Told| {
+        let before = Looked { emitters: told, ..Looked::default() };
+        let mut found = Vec::new();
+        for &node in &push.places.nodes {
+            let place = Place::new(light, node, push.places.middle(light.elements, node), aim);
+            push.weighted_above(light.elements, node, |at| {
+                let link = &links.all()[at];
+                let mean = light.emitted_toward(link).element_sum() * link.factor;
+                let outlook = place.outlook(light, link, mean);
+                if Group::of(light, link.sender) == Group::Emitter && link.visibility >= 0.0 {
+                    found.push(place.weight(light, link, (mean, outlook, 1.0), &before));
+                }
+            });
+        }
+        found
+    };
+    let all = looks(Told::default());
+    let rays = |found: &[Found]| found.iter().map(|found| found.rays).sum::<u32>();
+    let [as_told, hidden] = [320.0, 0.0].map(|free| looks(Told { expected: 320.0, free }));
+    assert_eq!(rays(&all), rays(&as_told), "links are right");
+    assert!(rays(&all) > 1000 && 3 * rays(&hidden) < rays(&all), "{} of {} rays", rays(&hidden), rays(&all));
+    for (all, hidden) in all.iter().zip(&hidden).filter(|(all, _)| all.free == all.rays as f32) {
+        assert_eq!(all.weight.value, hidden.weight.value, "all of it is seen");
+    }
 }
